@@ -191,7 +191,7 @@ def test_camera_is_chosen_by_name(memo_command, video, tmp_path):
 def test_mistakes_are_told_in_one_line(memo_command, video, tmp_path, monkeypatch, arguments, reason):
     monkeypatch.chdir(tmp_path)
     code, said, complaint = memo_command("track", video, *arguments)
-    assert (code, said) == (1, "")
+    assert (code, said) == (2 if reason in ("leave --fov-deg out", "needs --camera") else 1, "")
     assert complaint.startswith("memo: ") and complaint.count("\n") == 1 and reason in complaint
 
 

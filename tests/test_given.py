@@ -100,14 +100,27 @@ def test_a_file_called_like_a_url_is_read(command, tmp_path, write_video, luma_f
         ("batch nothere.csv", "nothere.csv: no such file"),
         ("report nothere", "nothere: no such folder"),
         ("calibrate points nothere.csv --size 640x480", "nothere.csv: no such file"),
+    ],
+)
+def test_what_is_not_there_is_refused(command, tmp_path, line, says):
+    assert command(line) == (1, f"memo: {says}\n")
+    assert [path for path in tmp_path.rglob("*") if path.is_file()] == []
+
+
+@pytest.mark.parametrize(
+    ("line", "says"),
+    [
         ("pointlight --dots 3", "--dots needs --lifetime"),
         ("pointlight --on joints", "--on needs --lifetime"),
         ("pointlight --noise-kind linear", "--noise-kind needs --noise-dots"),
+        ("pointlight --cycles 2 --seconds 3", "--seconds cannot be used with --cycles"),
         ("pointlight a.csv --seconds 2", "--seconds cannot be used with MOTION"),
+        ("track a.mp4 --camera-unit mm", "--camera-unit needs --camera"),
     ],
 )
-def test_what_is_not_there_or_has_no_effect_is_refused(command, tmp_path, line, says):
-    assert command(line) == (1, f"memo: {says}\n")
+def test_options_without_effect_are_wrong_usage(command, tmp_path, line, says):
+    (tmp_path / "a.mp4").mkdir()
+    assert command(line) == (2, f"memo: {says}\n")
     assert [path for path in tmp_path.rglob("*") if path.is_file()] == []
 
 

@@ -216,23 +216,26 @@ def test_markers_are_named_by_a_table_and_missing_ones_are_listed(tmp_path, memo
 
 
 @pytest.mark.parametrize(
-    ("options", "words"),
+    ("options", "wanted", "words"),
     [
-        ("jump.csv --cycles 1", "no period found up to 1.07 s: at the best lag, the mismatch is 0."),
-        ("jump.csv --cycles 1", "wanted); give --period\n"),
-        ("short.csv --cycles 1", "no lag fits better than those around it; give --period\n"),
-        ("--speed 9", "--speed 9 is not a walking speed in m/s (up to 4)"),
-        ("--speed 9 --cycles 1", "--speed 9 is not a walking speed in m/s (up to 4)"),
-        ("--speed nan", "--speed nan is not a walking speed"),
-        ("--noise-dots -3", "Invalid value for '--noise-dots'"),
-        ("--lifetime 0", "Invalid value for '--lifetime'"),
-        ("--azimuth-deg nan", "--azimuth-deg must be finite, got NaN"),
-        ("--px-per-m 0", "--px-per-m must be positive"),
-        ("--fps 0 --cycles 1", "--fps 0 must be positive and finite"),
-        ("walk.csv --cycles 1 --period 9", "--period of 9 s needs a longer motion"),
+        ("jump.csv --cycles 1", 1, "no period found up to 1.07 s: at the best lag, the mismatch is 0."),
+        ("jump.csv --cycles 1", 1, "wanted); give --period\n"),
+        ("short.csv --cycles 1", 1, "no lag fits better than those around it; give --period\n"),
+        ("--speed 9", 2, "--speed 9 is not a walking speed in m/s (up to 4)"),
+        ("--speed 9 --cycles 1", 2, "--speed 9 is not a walking speed in m/s (up to 4)"),
+        ("--speed nan", 2, "--speed nan is not a walking speed"),
+        ("--noise-dots -3", 2, "Invalid value for '--noise-dots'"),
+        ("--lifetime 0", 2, "Invalid value for '--lifetime'"),
+        ("--azimuth-deg nan", 2, "--azimuth-deg nan must be finite"),
+        ("--px-per-m 0", 2, "--px-per-m 0 must be positive"),
+        ("--shape star", 2, "Invalid value for '--shape'"),
+        ("--noise-dots 3 --noise-kind star", 2, "Invalid value for '--noise-kind'"),
+        ("--size 20000x9", 2, "--size must be between 1 and 16384 pixels"),
+        ("--fps 0 --cycles 1", 2, "--fps 0 must be positive and finite"),
+        ("walk.csv --cycles 1 --period 9", 1, "--period of 9 s needs a longer motion"),
     ],
 )
-def test_errors_name_the_options_of_the_command(tmp_path, memo_command, monkeypatch, options, words):
+def test_errors_name_the_options_of_the_command(tmp_path, memo_command, monkeypatch, options, wanted, words):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "200")
     write_table("walk.csv", WALKER)
@@ -241,7 +244,7 @@ def test_errors_name_the_options_of_the_command(tmp_path, memo_command, monkeypa
     still.positions[:] += np.random.default_rng(0).normal(size=still.positions.shape)
     write_table("jump.csv", still)
     code, said, err = memo_command("pointlight", *options.split())
-    assert code in (1, 2) and words in err and not said, err
+    assert code == wanted and words in err and not said, err
     assert "period_s" not in err and "shortened" not in err
 
 
@@ -319,13 +322,13 @@ def test_the_command_reports_dots_that_leave_the_picture_and_refuses_bad_picture
     for options, words in (
         (["--colour", "no"], "wanted a colour"),
         (["--size", "9"], "wanted two numbers such as 640x480"),
-        (["--dot-px", "0"], "dot_px"),
+        (["--dot-px", "0"], "--dot-px 0"),
         (["--scramble-axes", "both"], "--scramble-position"),
         (["--tempo", "2"], "--tempo needs MOTION"),
         (["--apart-m", "2"], "several MOTION"),
     ):
         code, _, err = memo_command(*common, *options)
-        assert code == 1 and words in err, (options, err)
+        assert code == 2 and words in err, (options, err)
 
 
 def write_table(path, walk, missing=()):

@@ -440,7 +440,7 @@ def test_mistakes_are_told_in_one_line(scene, tmp_path, monkeypatch, memo_postur
         if name not in arguments:
             arguments = [*arguments, name, value]
     code, said, complaint = memo_posture(*arguments)
-    assert (code, said) == (1, "")
+    assert (code, said) == (2 if reason == "leave --height out" else 1, "")
     assert complaint.startswith("memo: ") and complaint.count("\n") == 1 and reason in complaint
     assert not list(tmp_path.glob("out/postures*"))
 
@@ -451,6 +451,8 @@ def test_usage_mistakes_are_told_by_the_command_line(scene, memo_posture):
     assert memo_posture("--camera", camera)[0] == 2
     assert memo_posture(walk, "--camera", camera, "--rules", "flying")[0] == 2
     assert memo_posture(walk, "--camera", camera, "--anchor", "moon")[0] == 2
+    code, _, complaint = memo_posture(walk, "--camera", camera, "--track", folder)
+    assert code == 2 and "leave --camera, --fov-deg, --distance out" in complaint
 
 
 @pytest.mark.parametrize(

@@ -13,6 +13,7 @@ class Exit(IntEnum):
     TRACKED = 0
     DONE = 0  # for commands that track nobody
     BAD_INPUT = 1
+    WRONG_USAGE = 2  # of options; also Typer's own
     NOBODY = 3  # or no posture is left
     NO_EXTRA = 4
     SOME_FAILED = 5  # some of many videos failed

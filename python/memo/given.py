@@ -19,6 +19,7 @@ import memo
 
 __all__ = [
     "InputError",
+    "UsageError",
     "check_apart",
     "check_writable",
     "checked_fov",
@@ -37,6 +38,10 @@ __all__ = [
 
 class InputError(ValueError):
     """A mistake in the user's input; the message is one line."""
+
+
+class UsageError(InputError):
+    """Options that have no meaning, or none together."""
 
 
 _POINT = re.compile(r"(\d+(?:\.\d+)?),(\d+(?:\.\d+)?)@(\d+)")
@@ -144,10 +149,10 @@ def given_camera(camera: Path | None, reading: Mapping[str, Any], fov_deg: float
     `reading` has the options for the camera file: `name`, `unit`, `size`, `v_up`.
     """
     if camera is not None and fov_deg is not None:
-        raise InputError("--camera already holds the field of view: leave --fov-deg out")
+        raise UsageError("--camera already holds the field of view: leave --fov-deg out")
     for name, value in reading.items():
         if camera is None and value is not None:
-            raise InputError(f"--camera-{name.replace('_', '-')} needs --camera")
+            raise UsageError(f"--camera-{name.replace('_', '-')} needs --camera")
     if camera is not None:
         return {"camera": load_camera(camera, **reading)}
     return {} if fov_deg is None else {"fov_deg": checked_fov(fov_deg)}

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 from memo.exits import Exit
 from memo.files import plain
+from memo.given import UsageError
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -70,6 +71,8 @@ def _print_red(line: str) -> None:
 def guarded(work: Callable[[], Exit]) -> Exit:
     """Runs a command and prints a user's mistake as one line. With MEMO_DEBUG set, the traceback is kept.
 
+    Wrong usage of options has an exit code of its own.
+
     A closed pipe passes through to `main`, which handles it.
     """
     from memo.video import VideoDamageWarning
@@ -84,7 +87,7 @@ def guarded(work: Callable[[], Exit]) -> Exit:
         if os.environ.get("MEMO_DEBUG"):
             raise
         complain(" ".join(str(error).split()))
-        return Exit.BAD_INPUT
+        return Exit.WRONG_USAGE if isinstance(error, UsageError) else Exit.BAD_INPUT
     except KeyboardInterrupt:
         complain("interrupted")
         return Exit.INTERRUPTED

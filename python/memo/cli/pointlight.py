@@ -8,6 +8,7 @@ import re
 import shlex
 from collections.abc import Sequence
 from dataclasses import replace
+from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -17,7 +18,7 @@ import memo
 from memo.cli.delivery import Delivery, guarded
 from memo.exits import Exit
 from memo.files import write_table
-from memo.given import InputError, check_writable, nothing_at
+from memo.given import InputError, UsageError, check_writable, nothing_at
 from memo.wording import counted
 
 if TYPE_CHECKING:
@@ -45,16 +46,13 @@ _MOST_SPEED_MPS = 4.0
 _OPTIONS = {
     "period_s": "--period",
     "noise_sd_px": "--noise-px",
-    "noise_kind": "--noise-kind",
-    "life_sites": "--on",
-    "locomotion": "--locomotion",
-    "scramble_axes": "--scramble-axes",
     "scramble_limit_px": "--scramble-limit-px",
-    "tempo": "--tempo",
     "pixels per metre": "--px-per-m",
-    "azimuth": "--azimuth-deg",
+    "size_px": "--size",
+    "centre_px": "--centre",
+    "dot_px": "--dot-px",
 }
-"""The option for each argument that messages of `memo.pointlight` name."""
+"""The option for each argument that messages of `memo.pointlight` and of its displays name."""
 
 _MOST_SEED = 2**63 - 1
 
@@ -69,11 +67,52 @@ _NOISE_SDS = 6.0
 """Noise moves a dot from one frame to the next by less, in standard deviations of a coordinate."""
 
 
+class Locomotion(StrEnum):
+    """Treatment of the forward motion."""
+
+    TREADMILL = "treadmill"
+    TRANSLATING = "translating"
+    PELVIS = "pelvis"
+
+
+class Axes(StrEnum):
+    """Directions of the shifts of scrambled dots."""
+
+    BOTH = "both"
+    HORIZONTAL = "horizontal"
+    VERTICAL = "vertical"
+
+
+class Sites(StrEnum):
+    """Places of dots with a limited lifetime."""
+
+    LIMBS = "limbs"
+    JOINTS = "joints"
+
+
+class NoiseKind(StrEnum):
+    """Motion of noise dots."""
+
+    SCRAMBLED = "scrambled"
+    LINEAR = "linear"
+    FLICKER = "flicker"
+
+
+class Shape(StrEnum):
+    """Shape of a dot."""
+
+    DISC = "disc"
+    SQUARE = "square"
+    GAUSSIAN = "gaussian"
+
+
 def add_pointlight(app: "typer.Typer") -> None:
     import typer
 
     usual = memo._memo.defaults("pointlight")
+    usual_locomotion = Locomotion(usual["locomotion"])
     drawn = memo._memo.defaults("pointlight_frames")
+    usual_shape = Shape(drawn["shape"])
 
     @app.command(epilog=EPILOG)
     def pointlight(
@@ -112,9 +151,9 @@ def add_pointlight(app: "typer.Typer") -> None:
             float, typer.Option(help="Elevation of the viewer, degrees.", min=-90, max=90)
         ] = usual["elevation_deg"],
         px_per_m: Annotated[float, typer.Option(help="Scale, pixels per metre.")] = usual["px_per_m"],
-        locomotion: Annotated[str, typer.Option(help="treadmill, translating or pelvis.")] = usual[
-            "locomotion"
-        ],
+        locomotion: Annotated[
+            Locomotion, typer.Option(help="On the spot, as recorded, or with the pelvis fixed.")
+        ] = usual_locomotion,
         inverted: Annotated[bool, typer.Option("--inverted", help="Upside down.")] = False,
         mirrored: Annotated[bool, typer.Option("--mirrored", help="Facing the other way.")] = False,
         reversed_: Annotated[bool, typer.Option("--reversed", help="Played backwards.")] = False,
@@ -122,10 +161,9 @@ def add_pointlight(app: "typer.Typer") -> None:
             bool, typer.Option("--scramble-position", help="Move each dot's motion to a random place.")
         ] = False,
         scramble_axes: Annotated[
-            str | None,
+            Axes | None,
             typer.Option(
-                help="With --scramble-position: both, horizontal or vertical; "
-                f"default: {usual['scramble_axes']}."
+                help=f"With --scramble-position: directions of the shifts; default: {usual['scramble_axes']}."
             ),
         ] = None,
         scramble_limit_px: Annotated[
@@ -146,17 +184,13 @@ def add_pointlight(app: "typer.Typer") -> None:
             typer.Option(help=f"With --lifetime: dots shown; default: {usual['life_dots']}.", min=1),
         ] = None,
         on: Annotated[
-            str | None,
-            typer.Option(
-                help=f"With --lifetime: limbs or joints; default: {usual['life_sites']}.", metavar="TEXT"
-            ),
+            Sites | None,
+            typer.Option(help=f"With --lifetime: places of the dots; default: {usual['life_sites']}."),
         ] = None,
         noise_dots: Annotated[int, typer.Option(help="Number of noise dots.", min=0)] = usual["noise_dots"],
         noise_kind: Annotated[
-            str | None,
-            typer.Option(
-                help=f"With --noise-dots: scrambled, linear or flicker; default: {usual['noise_kind']}."
-            ),
+            NoiseKind | None,
+            typer.Option(help=f"With --noise-dots: their motion; default: {usual['noise_kind']}."),
         ] = None,
         noise_px: Annotated[
             float, typer.Option(help="Standard deviation of the dots' noise, pixels.", min=0)
@@ -176,7 +210,7 @@ def add_pointlight(app: "typer.Typer") -> None:
             typer.Option(help="Pixel of dots.csv in the middle; default: of the figure.", metavar="U,V"),
         ] = None,
         dot_px: Annotated[float, typer.Option(help="Size of a dot, pixels.")] = drawn["dot_px"],
-        shape: Annotated[str, typer.Option(help="Of a dot: disc, square or gaussian.")] = drawn["shape"],
+        shape: Annotated[Shape, typer.Option(help="Shape of a dot.")] = usual_shape,
         colour: Annotated[str, typer.Option(help="Of the dots.")] = _hexadecimal(drawn["colour"]),
         background: Annotated[str, typer.Option(help="Colour behind the dots.")] = _hexadecimal(
             drawn["background"]
@@ -232,16 +266,26 @@ def add_pointlight(app: "typer.Typer") -> None:
             and not (scramble_phase or (motion and cycles)),
         }
 
+        positive = {
+            "--period": period,
+            "--fps": fps,
+            "--seconds": seconds,
+            "--px-per-m": px_per_m,
+            "--dot-px": dot_px,
+            "--scramble-limit-px": scramble_limit_px,
+        }
+
         def work() -> Exit:
             for says, is_so in idle.items():
                 if is_so:
-                    raise InputError(says)
-            if period is not None and not (period > 0 and math.isfinite(period)):
-                raise InputError(f"--period {period:g} must be positive and finite")
-            if fps is not None and not (fps > 0 and math.isfinite(fps)):
-                raise InputError(f"--fps {fps:g} must be positive and finite")
+                    raise UsageError(says)
+            if not math.isfinite(azimuth_deg):
+                raise UsageError(f"--azimuth-deg {azimuth_deg:g} must be finite")
+            for option, value in positive.items():
+                if value is not None and not (value > 0 and math.isfinite(value)):
+                    raise UsageError(f"{option} {value:g} must be positive and finite")
             if speed is not None and not 0 < speed <= _MOST_SPEED_MPS:
-                raise InputError(
+                raise UsageError(
                     f"--speed {speed:g} is not a walking speed in m/s (up to {_MOST_SPEED_MPS:g})"
                 )
             picture = {
@@ -281,7 +325,10 @@ def _deliver(
     from memo.linkage import Points, write_points_csv
 
     out, (lossless, png) = delivery.out, also
-    display.frames(stop=0, **picture)  # refuses a bad picture before anything is written
+    try:
+        display.frames(stop=0, **picture)  # before anything is written
+    except ValueError as error:
+        raise UsageError(_in_options(str(error))) from None
     check_writable(out)
     remove_display(out)
     shown, labels = display.positions_px, display.labels
@@ -361,7 +408,7 @@ def _rgb(option: str, text: str) -> tuple[int, int, int]:
     try:
         red, green, blue = ImageColor.getrgb(text)[:3]
     except ValueError:
-        raise InputError(f"{option} {text}: wanted a colour such as #ffcc00 or white") from None
+        raise UsageError(f"{option} {text}: wanted a colour such as #ffcc00 or white") from None
     return red, green, blue
 
 
@@ -370,9 +417,9 @@ def _numbers(option: str, text: str, separator: str, kind: type[int] | type[floa
         first, second = (kind(part) for part in text.split(separator))
     except ValueError:
         wanted = "640x480" if kind is int else "120.5,-80"
-        raise InputError(f"{option} {text}: wanted two numbers such as {wanted}") from None
+        raise UsageError(f"{option} {text}: wanted two numbers such as {wanted}") from None
     if kind is int and min(first, second) < 1:
-        raise InputError(f"{option} {text}: wanted a width and height of at least 1")
+        raise UsageError(f"{option} {text}: wanted a width and height of at least 1")
     return first, second
 
 
@@ -458,9 +505,8 @@ def _display_of(
 
 
 def _in_options(message: str) -> str:
-    """A message of `memo.pointlight`, with the options of the command in place of its arguments."""
+    """A message of `memo.pointlight` or of its displays, with the command's options for their arguments."""
     message = message.replace(', or shift the phases with "shortened"', "")
-    message = message.replace("finite radians", "finite")
     unknown = r"at the best lag, the mismatch is inf of .* wanted\)"
     message = re.sub(unknown, "no lag fits better than those around it", message)
     for argument, option in _OPTIONS.items():
@@ -479,7 +525,7 @@ def _walker_points(
         walk = memo.walker_motion(cycles=1, rate_hz=rate_hz, speed_mps=speed)
     else:
         if not (math.isfinite(seconds * rate_hz) and 0 < seconds * rate_hz <= 100_000):
-            raise InputError(f"--seconds {seconds:g} at {rate_hz:g} frames per second cannot be shown")
+            raise UsageError(f"--seconds {seconds:g} at {rate_hz:g} frames per second cannot be shown")
         walk = memo.walker_motion(max(1, round(seconds * rate_hz)), rate_hz=rate_hz, speed_mps=speed)
     return Points(walk.names, walk.times_s, walk.positions), walk.cycle_s
 

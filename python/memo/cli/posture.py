@@ -14,7 +14,7 @@ import memo
 from memo.cli.delivery import Delivery, guarded, with_count
 from memo.cli.unswap import exchanges, one_of_several
 from memo.exits import Exit
-from memo.given import InputError, check_apart, check_writable, checked_height, given_camera
+from memo.given import InputError, UsageError, check_apart, check_writable, checked_height, given_camera
 from memo.posture_files import WRITTEN, write_postures
 from memo.wording import counted
 
@@ -170,7 +170,7 @@ def add_posture(app: "typer.Typer") -> None:
             view = {"name": camera_name, "unit": camera_unit, "size": camera_size, "v_up": camera_v_up}
             seen_by = {"track": track} if track is not None else {}
             if track is not None and (camera is not None or fov_deg is not None or distance is not None):
-                raise InputError(
+                raise UsageError(
                     "--track has a camera and distances: leave --camera, --fov-deg, --distance out"
                 )
             seen_by |= given_camera(camera, view, fov_deg)
@@ -217,7 +217,7 @@ def _posture(
 
 def _scale(lengths: Path | None, height_m: float | None) -> dict[str, Any]:
     if lengths is not None and height_m is not None:
-        raise InputError("--lengths already hold the height: leave --height out")
+        raise UsageError("--lengths already hold the height: leave --height out")
     if lengths is not None:
         return {"lengths": memo.read_lengths(lengths)}
     return {} if height_m is None else {"height_m": checked_height(height_m)}
