@@ -211,8 +211,19 @@ def test_markers_are_named_by_a_table_and_missing_ones_are_listed(tmp_path, memo
     arguments[3] = tmp_path / "bad.toml"
     code, _, err = memo_command(*arguments, "--out", tmp_path / "bad")
     assert code == 1 and "no points for RKNE (right_knee), nothing (left_knee)" in err
-    (tmp_path / "bad.toml").write_text('tail = "m1"\n')
-    assert "got tail" in memo_command(*arguments, "--out", tmp_path / "bad")[2]
+    for text, words in (
+        ('tail = "m1"\n', "got tail"),
+        ('right_hip = "m1"\nleft_hip = "m2"\nright_hip = "m3"\n', "right_hip has two entries; list the"),
+        ('right_hip = "m1"\n  RHP = "m3"\n', "right_hip has two entries; list the"),
+        ("", "names no joint; wanted lines such as right_hip ="),
+        ("# right_hip\n", "names no joint; wanted lines such as right_hip ="),
+        ('right_hip = "m1\n', "not TOML"),
+        ("right_hip = []\n", "right_hip: wanted the name of a marker"),
+    ):
+        (tmp_path / "bad.toml").write_text(text)
+        code, _, err = memo_command(*arguments, "--out", tmp_path / "bad")
+        assert code == 1 and err.startswith(f"memo: {tmp_path / 'bad.toml'}: "), err
+        assert words in err and "overwrite" not in err and "walk.csv" not in err
 
 
 @pytest.mark.parametrize(

@@ -52,6 +52,8 @@ _POSE2SIM = {
 NAMINGS = ("memo", "pose2sim", "gait2392")
 """Names in which motions can be written: memo's own joints, and those of two families of OpenSim models."""
 
+_KEY = re.compile(r"^[ \t]*[\"']?([\w-]+)[\"']?[ \t]*=", re.MULTILINE)  # of a line of TOML
+
 _MIDDLE = {
     "head": ("head", "headtop", "nose"),
     "neck": ("neck", "c7"),
@@ -190,10 +192,18 @@ def read_marker_map(path: Path) -> dict[str, tuple[str, ...]]:
     The joints have memo's names. Raises `FormatError` for joints that memo does not know.
     """
     try:
-        table = tomllib.loads(path.read_text("utf-8"))
+        text = path.read_text("utf-8")
     except OSError as error:
         raise FormatError(f"{path}: cannot be read: {error.strerror or error}") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except UnicodeDecodeError as error:
+        raise FormatError(f"{path}: not TOML: {error}") from None
+    try:
+        table = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        keys = Counter(_KEY.findall(text))
+        twice = [joint for joint, count in keys.items() if count > 1]
+        if twice:
+            raise FormatError(f"{path}: {_two_entries(twice)}") from None
         raise FormatError(f"{path}: not TOML: {error}") from None
     markers = {}
     for joint, value in table.items():
@@ -212,14 +222,22 @@ def _joints_of(markers: Mapping[str, tuple[str, ...]], path: Path) -> dict[str, 
         spelt = {joint: _memo.joint_name(joint) for joint in markers}
     except ValueError as error:
         raise FormatError(f"{path}: {error}") from None
+    known = ", ".join([*JOINTS, "head"])
+    if not markers:
+        raise FormatError(
+            f'{path}: names no joint; wanted lines such as right_hip = "RASI" for any of {known}'
+        )
     unknown = [joint for joint, name in spelt.items() if name is None]
-    if unknown or not markers:
-        known = ", ".join([*JOINTS, "head"])
-        raise FormatError(f"{path}: joints of memo wanted ({known}), got {', '.join(unknown) or 'none'}")
-    twice = [joint for joint, count in Counter(spelt.values()).items() if count > 1]
+    if unknown:
+        raise FormatError(f"{path}: joints of memo wanted ({known}), got {', '.join(unknown)}")
+    twice = [str(joint) for joint, count in Counter(spelt.values()).items() if count > 1]
     if twice:
-        raise FormatError(f"{path}: joints with two entries: {listed([str(joint) for joint in twice])}")
+        raise FormatError(f"{path}: {_two_entries(twice)}")
     return {str(spelt[joint]): wanted for joint, wanted in markers.items()}
+
+
+def _two_entries(joints: Sequence[str]) -> str:
+    return f'{listed(joints)} has two entries; list the markers of a joint in one: ["A", "B"]'
 
 
 def mapped_points(
