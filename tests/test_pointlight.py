@@ -321,6 +321,26 @@ def test_a_file_has_the_same_size_under_other_names(tmp_path, memo_command, up):
     assert read_motion(tmp_path / "renamed.bvh").notes != tuple(notes[0])
 
 
+def test_several_actors_share_the_noise_dots_and_loop_only_with_equal_cycles(tmp_path, memo_command):
+    files = []
+    for index, speed in enumerate((1.0, 1.6, 1.3)):
+        files.append(tmp_path / f"{index}.csv")
+        write_table(files[-1], memo.walker_motion(150, speed_mps=speed))
+    common = ["--size", "64x64", "--out", tmp_path / "out"]
+    for options, dots in (([], 3 * 13 + 20), (["--lifetime", "3", "--dots", "4"], 3 * 4 + 20)):
+        code, said, err = memo_command(
+            "pointlight", *files, "--noise-dots", "20", *options, *common, "--json"
+        )
+        assert code == 0 and json.loads(said)["dots"] == dots, err
+    with open(tmp_path / "out" / "labels.csv", newline="") as file:
+        first = [row["shows"] for row in csv.DictReader(file) if row["frame"] == "0"]
+    assert first.count("noise") == 20
+    code, said, err = memo_command("pointlight", *files[:2], "--cycles", "2", *common)
+    assert code == 1 and "take 1.267, 0.8 s" in err and "leave --cycles out" in err
+    code, said, err = memo_command("pointlight", files[0], files[0], "--cycles", "2", *common)
+    assert code == 0 and " loops." in said, err
+
+
 def test_the_command_reports_dots_that_leave_the_picture_and_refuses_bad_pictures(tmp_path, memo_command):
     out = tmp_path / "out"
     common = ["pointlight", "--cycles", "1", "--size", "200x200", "--px-per-m", "150", "--out", out]

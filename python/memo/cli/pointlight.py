@@ -181,13 +181,17 @@ def add_pointlight(app: "typer.Typer") -> None:
         ] = None,
         dots: Annotated[
             int | None,
-            typer.Option(help=f"With --lifetime: dots shown; default: {usual['life_dots']}.", min=1),
+            typer.Option(
+                help=f"With --lifetime: dots shown per figure; default: {usual['life_dots']}.", min=1
+            ),
         ] = None,
         on: Annotated[
             Sites | None,
             typer.Option(help=f"With --lifetime: places of the dots; default: {usual['life_sites']}."),
         ] = None,
-        noise_dots: Annotated[int, typer.Option(help="Number of noise dots.", min=0)] = usual["noise_dots"],
+        noise_dots: Annotated[int, typer.Option(help="Number of noise dots in the display.", min=0)] = usual[
+            "noise_dots"
+        ],
         noise_kind: Annotated[
             NoiseKind | None,
             typer.Option(help=f"With --noise-dots: their motion; default: {usual['noise_kind']}."),
@@ -477,14 +481,16 @@ def _read_points(path: Path, markers: Path | None, fps: float | None) -> tuple[A
 def _display_of(
     actors: list[Any], options: dict[str, Any], apart_m: float | None
 ) -> tuple[memo._memo.PointLightDisplay, list[str]]:
-    """One display of all actors, each with its own seed, and the names of all points."""
+    """One display of all actors, each with its own seed and its share of the noise dots, and the names of all
+    points."""
+    share, rest = divmod(options["noise_dots"], len(actors))
     try:
         displays = [
             memo.pointlight(
                 np.ascontiguousarray(points.positions, dtype=np.float64),
                 points.times_s,
                 points.names,
-                **{**options, "seed": options["seed"] + index},
+                **{**options, "seed": options["seed"] + index, "noise_dots": share + (index < rest)},
             )
             for index, points in enumerate(actors)
         ]
@@ -492,6 +498,14 @@ def _display_of(
         raise InputError(_in_options(str(error))) from None
     if len(displays) == 1:
         return displays[0], actors[0].names
+    if len({len(display.times_s) for display in displays}) > 1:
+        cycles_s = ", ".join(
+            f"{display.period_s:.4g}" for display in displays if display.period_s is not None
+        )
+        raise InputError(
+            f"the cycles of the motions take {cycles_s} s, so they cannot loop together: leave --cycles out,"
+            " or give each its own tempo in Python and join the displays with memo.pointlight_together"
+        )
     offsets = None
     if apart_m is not None:
         middle = np.mean([display.centre_px for display in displays], axis=0)
