@@ -36,6 +36,7 @@ OPTIONS = {
     ("pointlight", "on"): "life_sites",
     ("pointlight", "noise_dots"): "noise_dots",
     ("pointlight", "noise_kind"): "noise_kind",
+    ("pointlight", "noise_area"): "noise_area",
     ("pointlight", "noise_px"): "noise_sd_px",
     ("pointlight", "seed"): "seed",
     ("posture", "rules"): "rules",

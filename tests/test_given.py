@@ -113,6 +113,7 @@ def test_what_is_not_there_is_refused(command, tmp_path, line, says):
         ("pointlight --dots 3", "--dots needs --lifetime"),
         ("pointlight --on joints", "--on needs --lifetime"),
         ("pointlight --noise-kind linear", "--noise-kind needs --noise-dots"),
+        ("pointlight --noise-area 2", "--noise-area needs --noise-dots"),
         ("pointlight --cycles 2 --seconds 3", "--seconds cannot be used with --cycles"),
         ("pointlight a.csv --seconds 2", "--seconds cannot be used with MOTION"),
         ("track a.mp4 --camera-unit mm", "--camera-unit needs --camera"),

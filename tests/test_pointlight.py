@@ -321,6 +321,28 @@ def test_a_file_has_the_same_size_under_other_names(tmp_path, memo_command, up):
     assert read_motion(tmp_path / "renamed.bvh").notes != tuple(notes[0])
 
 
+def test_the_region_of_noise_dots_has_the_size_asked_for(tmp_path, memo_command):
+    common = ["pointlight", "--seconds", "0.5", "--size", "64x64", "--out", tmp_path, "--noise-dots", "400"]
+    sizes = []
+    for options in ([], ["--noise-area", "3"]):
+        code, _, err = memo_command(*common, "--noise-kind", "flicker", *options)
+        assert code == 0, err
+        with open(tmp_path / "dots.csv", newline="") as file:
+            rows = list(csv.DictReader(file))
+        uv = np.array([[float(row[key]) for key in row if key.endswith("_px")] for row in rows])
+        figure, noise = uv[:, : 2 * 13].reshape(-1, 2), uv[:, 2 * 13 :].reshape(-1, 2)
+        sizes.append(np.ptp(noise, axis=0) / np.ptp(figure, axis=0))
+        middles = [(part.min(axis=0) + part.max(axis=0)) / 2 for part in (figure, noise)]
+        assert np.allclose(*middles, atol=5)
+    assert np.allclose(sizes, [[1.5, 1.5], [3, 3]], rtol=0.02)
+    for area, code, words in (
+        ("0", 2, "--noise-area 0 must be positive"),
+        ("2000", 1, "--noise-area must be"),
+    ):
+        ended, _, err = memo_command(*common, "--noise-area", area)
+        assert ended == code and words in err
+
+
 def test_several_actors_share_the_noise_dots_and_loop_only_with_equal_cycles(tmp_path, memo_command):
     files = []
     for index, speed in enumerate((1.0, 1.6, 1.3)):

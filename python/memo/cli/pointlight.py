@@ -47,6 +47,7 @@ _OPTIONS = {
     "period_s": "--period",
     "noise_sd_px": "--noise-px",
     "scramble_limit_px": "--scramble-limit-px",
+    "area_scale of the noise dots": "--noise-area",
     "pixels per metre": "--px-per-m",
     "size_px": "--size",
     "centre_px": "--centre",
@@ -196,6 +197,13 @@ def add_pointlight(app: "typer.Typer") -> None:
             NoiseKind | None,
             typer.Option(help=f"With --noise-dots: their motion; default: {usual['noise_kind']}."),
         ] = None,
+        noise_area: Annotated[
+            float | None,
+            typer.Option(
+                help="With --noise-dots: width and height of their region, in those of the figure; "
+                f"default: {usual['noise_area']}."
+            ),
+        ] = None,
         noise_px: Annotated[
             float, typer.Option(help="Standard deviation of the dots' noise, pixels.", min=0)
         ] = usual["noise_sd_px"],
@@ -249,6 +257,7 @@ def add_pointlight(app: "typer.Typer") -> None:
             "life_sites": on,
             "noise_dots": noise_dots,
             "noise_kind": noise_kind,
+            "noise_area": noise_area,
             "noise_sd_px": noise_px,
             "seed": seed,
         }
@@ -257,6 +266,7 @@ def add_pointlight(app: "typer.Typer") -> None:
             "--dots needs --lifetime": dots is not None and lifetime is None,
             "--on needs --lifetime": on is not None and lifetime is None,
             "--noise-kind needs --noise-dots": noise_kind is not None and not noise_dots,
+            "--noise-area needs --noise-dots": noise_area is not None and not noise_dots,
             "--scramble-axes needs --scramble-position": scramble_axes is not None and not scramble_position,
             "--scramble-limit-px needs --scramble-position": scramble_limit_px is not None
             and not scramble_position,
@@ -276,6 +286,7 @@ def add_pointlight(app: "typer.Typer") -> None:
             "--seconds": seconds,
             "--px-per-m": px_per_m,
             "--dot-px": dot_px,
+            "--noise-area": noise_area,
             "--scramble-limit-px": scramble_limit_px,
         }
 
