@@ -5,6 +5,8 @@ import pickle
 import memo
 import numpy as np
 import pytest
+from conftest import SHARED_DATA
+from memo.video import VideoReader
 
 SEED = 0
 
@@ -108,3 +110,47 @@ def test_colour_is_refused(scene, walk):
 def test_a_walk_of_another_process_is_refused(scene, walk):
     with pytest.raises(RuntimeError, match="another process"):
         memo.fit_walk(pickle.loads(pickle.dumps(walk)), scene.frames)
+
+
+def refitted(frames, walk):
+    """The same walk fitted again to its own frames, and how far its knees move by that, degrees."""
+    again = memo.fit_walk(walk, frames)
+    assert again.fit is not None, again.fit_problem
+    moved = [
+        again.columns[f"{side}_knee_deg"] - walk.columns[f"{side}_knee_deg"] for side in ("right", "left")
+    ]
+    return again, float(np.sqrt(np.nanmean(np.square(moved))))
+
+
+def test_a_walk_on_a_treadmill_is_fitted_again():
+    scene = memo.demo_scene(2, frames=120, mover="treadmill")
+    (walk,) = memo.track(scene.frames, fps=25, camera=scene.camera, height_m=scene.height_m).walks
+    again, moved_deg = refitted(scene.frames, walk)
+    assert moved_deg < 1.5
+    assert again.treadmill.belt_mps == pytest.approx(walk.treadmill.belt_mps, rel=0.05)
+
+
+def shared_scene(name):
+    folder = SHARED_DATA / "people" / name
+    if not folder.is_dir():
+        pytest.skip(f"no scene in {folder} (set MEMO_SHARED_DATA)")
+    with VideoReader(folder / "video.mp4") as reader:
+        frames = [frame.luma.copy() for frame in reader]
+    return frames, memo.Camera.from_toml(folder / "camera.toml")
+
+
+def test_pictures_of_a_camera_in_the_hand_are_turned_back():
+    frames, camera = shared_scene("shake3")
+    (walk,) = memo.track(frames, fps=25, camera=camera, height_m=1.84).walks
+    _, moved_deg = refitted(frames, walk)
+    assert moved_deg < 2
+
+
+def test_each_of_several_people_is_fitted_again():
+    """Other people are taken for part of the scene, so that who is covered by them is measured less well."""
+    frames, camera = shared_scene("cross2")
+    walks = memo.track(frames, fps=25, camera=camera, height_m=[1.62, 1.84]).walks
+    assert len(walks) == 2
+    for walk in walks:
+        again, moved_deg = refitted(frames, walk)
+        assert moved_deg < 4 and again.person == walk.person
