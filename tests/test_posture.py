@@ -350,7 +350,7 @@ def test_where_nothing_is_left_it_is_said_why(scene, tmp_path, memo_posture):
     spread = np.linalg.norm(truth[:, AT["right_ankle"]] - truth[:, AT["left_ankle"]], axis=1)
     options = ("--camera", folder / "camera.toml", "--lengths", folder / "lengths.csv", "--fps", "25")
     options += ("--strength", "paper", "--out", tmp_path / "out")
-    kept, document = truth[spread > 0.65], None
+    kept, document = truth[spread > 0.6], None
     while document is None or not all(frame["cut_all"] for frame in document["per_frame"]):
         if document:
             kept = kept[[frame["frame"] for frame in document["per_frame"] if frame["cut_all"]]]

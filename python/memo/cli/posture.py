@@ -241,16 +241,21 @@ def _row(keypoints: memo.Keypoints, frame: int) -> int:
 
 def _impossible(postures: memo.Postures) -> str | None:
     """States that the motion is impossible, and what it breaks most; None if there is no motion."""
-    breaks = Counter(name for names in postures.linked_breaks for name in names)
-    if not breaks:
+    most = _most_broken(postures)
+    if not most:
         return None
-    often = ((name.replace("_", " "), count) for name, count in breaks.most_common(_MOST_BREAKS))
-    most = ", ".join(f"{name} in {count}" for name, count in often)
     frames = counted(postures.found.sum(), "frame")
     return (
         f"No possible sequence (--rules {postures.rules}): in every frame of the motion, {frames}, the "
         f"posture breaks a constraint; most often {most}."
     )
+
+
+def _most_broken(postures: memo.Postures) -> str:
+    """The constraints that the motion breaks most often, with the numbers of frames; empty if none."""
+    breaks = Counter(name for names in postures.linked_breaks for name in names)
+    often = ((name.replace("_", " "), count) for name, count in breaks.most_common(_MOST_BREAKS))
+    return ", ".join(f"{name} in {count}" for name, count in often)
 
 
 def _lines(postures: memo.Postures) -> list[str]:
@@ -273,7 +278,7 @@ def _frames_line(postures: memo.Postures) -> str:
     line += _why_none(postures)
     breaking = sum(map(bool, postures.linked_breaks))
     if breaking:
-        line += f"; the posture in the motion breaks a constraint in {breaking}"
+        line += f"; the posture in the motion breaks a constraint in {breaking} ({_most_broken(postures)})"
     if postures.repair is not None and any(postures.repair.exchanged.values()):
         line += f"; right and left exchanged: {exchanges(postures.repair)}"
     return f"{line}."
