@@ -93,7 +93,8 @@ def test_intervals_hold_what_was_motion_captured(name, knows_camera):
     for parameter, share in shares.items():
         line = lookup(table, 0, parameter)
         assert line["ci_high"] - line["ci_low"] < 2 * share * line["value"]
-    assert len(track.sentences) == 2, "healthy walkers are not called asymmetric"
+    said = [sentence for sentence in track.sentences if "upright lines" not in sentence]
+    assert len(said) == 2, "healthy walkers are not called asymmetric"
     assert track.sentences[1].startswith("The model fits the person")
 
 
@@ -207,7 +208,7 @@ def test_the_command_line_says_it_and_writes_it(tmp_path, monkeypatch, capsys):
         cli.main()
     assert not exited.value.code
     said = json.loads(capsys.readouterr().out)
-    assert said["sentences"][0] == said["message"] and len(said["sentences"]) == 2
+    assert said["sentences"][0] == said["message"] and len(said["sentences"]) == 3
     assert str(tmp_path / "gait_parameters.csv") in said["files"]
     table = read_gait_parameters_csv(tmp_path / "gait_parameters.csv")
     assert set(table["parameter"]) == set(DEFINITIONS), (
