@@ -340,7 +340,7 @@ mod tests {
             figure[side.knee()] = figure[side.hip()] + hang(thigh) * lengths.to[side.knee()];
             figure[side.ankle()] = figure[side.knee()] + hang(shank) * lengths.to[side.ankle()];
         }
-        let sole = 0.19 * lengths.to[Joint::RightAnkle];
+        let sole = 0.18 * lengths.to[Joint::RightAnkle];
         let lowest = figure[lifted.other().ankle()].y;
         PerJoint(figure.0.map(|p| p + DVec3::new(0.1, 1.2 - sole - lowest, 4.0)))
     }
@@ -388,7 +388,7 @@ mod tests {
         let options = AnchorOptions::default();
         for true_scale in [0.93, 1.0, 1.05] {
             // At the ankle's height of the assumed lengths, which the scale does not change.
-            let lift_m = 0.19 * assumed.to[Joint::RightAnkle] * (true_scale - 1.0);
+            let lift_m = 0.18 * assumed.to[Joint::RightAnkle] * (true_scale - 1.0);
             let figure = standing(&scaled(&assumed, true_scale), Side::Left);
             let seen = |away_m: f64| rays(&PerJoint(figure.0.map(|p| p + DVec3::new(0.0, lift_m, away_m))));
             let frames: Vec<JointRays> = (0..5).map(|k| seen(0.3 * f64::from(k))).collect();
@@ -516,7 +516,7 @@ mod tests {
         let options = AnchorOptions::default();
         let rays = JointRays { noise_rad: 1e-3, ..JointRays::from_points(&StickFigure::UNKNOWN) };
         let scene = scene_of(&rays, &lengths, &options);
-        let stands_m = 0.19 * lengths.to[Joint::LeftAnkle];
+        let stands_m = 0.18 * lengths.to[Joint::LeftAnkle];
         let at = |height_m: f64, variance: f64| {
             let point = DVec3::new(0.0, 1.2 - stands_m - height_m, 4.0);
             Link { point, variance, cost: 0.0 }

@@ -250,7 +250,7 @@ impl Default for AnchorOptions {
             length_sd: 0.02,
             rigidity_sd_m: 0.01,
             lean_sd_rad: 7f64.to_radians(),
-            ankle_height_over_shank: 0.19,
+            ankle_height_over_shank: 0.18,
             ankle_height_sd_m: 0.02,
             swing_height_m: 0.09,
             balance_sd_m: 0.12,

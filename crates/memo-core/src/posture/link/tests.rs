@@ -357,8 +357,8 @@ fn the_lower_ankle_stands_on_the_ground() {
     assert_eq!(problem.support_cost([f64::NAN, 2.0 * sd]), 0.0);
     assert!((problem.support_cost([-2.0 * sd, f64::NAN]) - 4.0).abs() < 1e-12);
     assert_eq!(problem.support_cost([f64::NAN; 2]), 0.0);
-    // The ankle of a supporting foot is 0.19 of the shank above the ground.
-    let standing = 0.19 * lengths.to[Joint::LeftAnkle];
+    // The ankle of a supporting foot is 0.18 of the shank above the ground.
+    let standing = 0.18 * lengths.to[Joint::LeftAnkle];
     let point = DVec3::new(0.5, 1.2 - standing - 0.25, 3.0);
     assert!((problem.lift_m(Joint::LeftAnkle, point) - 0.25).abs() < 1e-12);
     let nowhere = LinkOptions::default();
