@@ -87,7 +87,7 @@ def test_frames_without_the_person_are_neither_undecided_nor_exchanged(tmp_path,
     decided = memo._memo.unswap(
         keypoints.times_s, keypoints.points, keypoints.scores, groups={"legs": LEVELS}
     )["legs"].decided
-    assert not decided[20:45].all(), "the core says nothing of frames that it does not see"
+    assert not decided[20:45].all(), "frames without points are undecided"
     assert repair.undecided == {"legs": int((~decided).sum() - (~decided[20:45]).sum())}
     hidden = {frame for row in repair.flips for frame in range(row["frame"], row["last_frame"] + 1)}
     assert hidden.isdisjoint(range(20, 45))

@@ -1,6 +1,6 @@
 //! Hand-made figures for tests.
 //!
-//! If nothing else is said, axes are those of an upright trunk: x forward, y down, z to the left, metres.
+//! Unless stated otherwise, axes are those of an upright trunk: x forward, y down, z to the left, metres.
 
 use std::array::from_fn;
 

@@ -17,7 +17,9 @@ use crate::wording::counted;
 use glam::DVec3;
 use thiserror::Error;
 
-use super::anchor::{Anchor, AnchorError, AnchorOptions, Ground, from_ground, from_trunk, standing_scale};
+use super::anchor::{
+    Anchor, AnchorError, AnchorOptions, Ground, from_ground, from_trunk, standing_scale, standing_span_m,
+};
 use super::lift::JointRays;
 use crate::model::skeleton::{Joint, LengthError, PerJoint, RigidDistance, SegmentLengths};
 
@@ -115,7 +117,7 @@ impl LengthFit {
     /// distance that is too large are too large, and longer legs put the neck farther away. With a known height
     /// extents give the proportions only.
     fn keep_height_of(&mut self, prior: &LengthPrior, (scale, scale_sd): (f64, f64)) {
-        let factor = scale * neck_to_ankle_m(&prior.lengths) / neck_to_ankle_m(&self.lengths);
+        let factor = scale * standing_span_m(&prior.lengths) / standing_span_m(&self.lengths);
         self.lengths.to.0.iter_mut().chain(&mut self.lengths.rigid).for_each(|length_m| *length_m *= factor);
         self.scale *= factor;
         for estimate in &mut self.estimates {
@@ -149,13 +151,6 @@ fn scale_of_height(prior_sd: f64, seen: Option<(f64, f64)>) -> (f64, f64) {
     }
     let mean = first / total;
     if total > 0.0 { (mean, (second / total - mean * mean).max(0.0).sqrt()) } else { (1.0, prior_sd) }
-}
-
-/// Length of trunk, thigh and shank of an upright person.
-fn neck_to_ankle_m(lengths: &SegmentLengths) -> f64 {
-    let half_m = 0.5 * lengths.rigid[RigidDistance::Hips as usize];
-    let down_m = (lengths.to[Joint::RightHip].powi(2) - half_m * half_m).max(0.0).sqrt();
-    lengths.to[Joint::Pelvis] + down_m + lengths.to[Joint::RightKnee] + lengths.to[Joint::RightAnkle]
 }
 
 /// Why no lengths were estimated.

@@ -385,7 +385,7 @@ pub fn from_extent(
 }
 
 /// Trunk (neck to hips), thigh and shank in a line, metres.
-fn standing_span_m(lengths: &SegmentLengths) -> f64 {
+pub(super) fn standing_span_m(lengths: &SegmentLengths) -> f64 {
     let pair = |right: Joint| 0.5 * (lengths.to[right] + lengths.to[right.mirrored()]);
     lengths.to[Joint::Pelvis]
         + pelvis_to_hip_line_m(lengths)
