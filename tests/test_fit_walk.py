@@ -147,7 +147,7 @@ def test_pictures_of_a_camera_in_the_hand_are_turned_back():
 
 
 def test_each_of_several_people_is_fitted_again():
-    """Other people are taken for part of the scene, so that who is covered by them is measured a little differently."""
+    """Other people are taken for part of the scene, so who is covered by them is measured otherwise."""
     frames, camera = shared_scene("cross2")
     walks = memo.track(frames, fps=25, camera=camera, height_m=[1.62, 1.84]).walks
     assert len(walks) == 2

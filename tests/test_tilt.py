@@ -111,7 +111,7 @@ def test_who_walks_in_a_picture_that_is_turned_has_the_angles_of_the_upright_one
             walk.columns[f"{side}_{name}_deg"] - true[f"{side}_{name}"][rows] for side in ("right", "left")
         ]
         assert np.sqrt(np.nanmean(np.square(off))) < limit, name
-    # With the same camera given, only the error of the roll is missing from the stated ones, and only at the hip.
+    # With the same camera given, the stated errors lack that of the roll, at the hip alone.
     (given,) = memo.track(frames, fps=25, height_m=1.66, camera=walk.camera).walks
     assert given.camera_tilt is None
 

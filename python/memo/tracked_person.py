@@ -4,8 +4,9 @@ The walk gives the camera, the height, the direction of walking and the distance
 Which walk it is follows from the image: the one whose joints are nearest to the keypoints.
 
 Limits: the walk's joints are those of its body model, so its segment lengths are not those of a detector's
-points and are not used: with them the joints of drawn walks are 7.6 and 6.5 instead of 6.0 and 5.5 cm off. Nor is
-its phase: linking finds the same one by the limbs, and the errors stay the same. Frames farther than half a second from the walk have no distance.
+points and are not used: with them the joints of drawn walks are 7.6 and 6.5 instead of 6.0 and 5.5 cm off.
+Nor is its phase: linking finds the same one by the limbs, and the errors stay the same. Frames farther than
+half a second from the walk have no distance.
 """
 
 from __future__ import annotations
