@@ -6,6 +6,7 @@ import memo
 import numpy as np
 import pytest
 from conftest import SHARED_DATA
+from memo.files import TRACK_COLUMNS
 from memo.video import VideoReader
 
 SEED = 0
@@ -82,6 +83,15 @@ def test_pictures_of_nobody_leave_a_reason(scene, walk, empty):
     again = memo.fit_walk(walk, [empty] * len(scene.frames), empty=empty)
     assert again.fit is None and again.fit_problem
     assert len(again) == len(walk) and np.all(np.isnan(again.columns["sd_right_hip_deg"]))
+
+
+def test_angles_of_a_person_who_was_not_measured_are_empty(scene, empty):
+    track = memo.track(list(scene.frames), fps=25, camera=scene.camera, height_m=scene.height_m)
+    lost = memo.Track([memo.fit_walk(track.walks[0], [empty] * len(scene.frames))], track.seek_report)
+    assert len(lost) == len(track)
+    assert all(np.isnan(lost.columns[name]).all() for name in TRACK_COLUMNS if name.endswith("_deg"))
+    for kept in ("x_m", "phase", "right_knee_x_m"):  # the result of the tracker
+        assert np.isfinite(lost.columns[kept]).all()
 
 
 @pytest.mark.parametrize(

@@ -41,6 +41,7 @@ LIKELY_SWAPPED = 0.2
 
 _log = logging.getLogger(__name__)
 
+_ANGLE_COLUMNS = tuple(name for name in TRACK_COLUMNS if name.endswith("_deg"))
 _WHOLE_NUMBERS = {"frame": np.int64, "walk": np.int64, "person": np.int64}
 
 
@@ -321,12 +322,16 @@ class Track:
 
     @property
     def columns(self) -> dict[str, npt.NDArray[Any]]:
-        """One array per column of `track.csv`; one walk after another."""
+        """One array per column of `track.csv`; one walk after another.
+
+        Of a walk whose person could not be measured, angles are NaN; `Walk.columns` keeps those of the
+        tracker, which are those of average gait.
+        """
         if not self.walks:
             return {name: np.empty(0, _WHOLE_NUMBERS.get(name, float)) for name in TRACK_COLUMNS}
         people = self.people
         tables = [
-            {**walk.columns, "walk": np.full(len(walk), k), "person": np.full(len(walk), people[k])}
+            {**_measured(walk), "walk": np.full(len(walk), k), "person": np.full(len(walk), people[k])}
             for k, walk in enumerate(self.walks)
         ]
         columns = {name: np.concatenate([table[name] for table in tables]) for name in TRACK_COLUMNS}
@@ -596,6 +601,14 @@ _NOBODY = {
     "not walking": "Something moves, but not like a walking person of this height seen by this camera.",
     "never fully visible": "Somebody moves, but is never fully visible for long enough to start.",
 }
+
+
+def _measured(walk: _memo.Walk) -> dict[str, npt.NDArray[Any]]:
+    """The columns of a walk, with NaN for angles of average gait where those of the person were wanted."""
+    columns = dict(walk.columns)
+    if walk.fit is None and walk.fit_problem is not None:
+        columns |= {name: np.full(len(walk), np.nan) for name in _ANGLE_COLUMNS}
+    return columns
 
 
 def _fit(walk: _memo.Walk) -> dict[str, Any]:
