@@ -70,9 +70,10 @@ for name in ("track.csv", "gait_parameters.csv"):
             file.write("1,cadence,," + height + ",1/min,,,4\\n")
 with open(os.path.join(out, "run.json"), "w") as file:
     options = '"options": {"height_m": ' + height + '}, "camera_given": false'
+    times = ', "start_s": 0.5, "end_s": 2.25'
     ways = (
-        ("left to right", "forward", 0.01, ', "start_s": 0.5, "end_s": 2.25'),
-        ("right to left", "backward", 0.2, ""),
+        ("left to right", "forward", 0.01, times + ', "fit": {"measured": true, "fits": "in part"}'),
+        ("right to left", "backward", 0.2, ', "fit": {"measured": false}'),
     )
     walk = '{"direction": "%s", "gait": "%s", "p_swapped": %s%s}'
     walks = ", ".join(walk % way for way in ways) if todo[0] != "nobody" else ""
@@ -462,12 +463,12 @@ def test_each_walk_of_a_video_has_its_own_direction(lab):
     lab.videos("twice")
     lab.run()
     seen = [
-        [row[name] for name in ("walk", "person", "direction", "gait", "p_swapped")]
+        [row[name] for name in ("walk", "person", "direction", "gait", "p_swapped", "fits")]
         for row in table(lab.out, "gait_parameters.csv")
     ]
     assert seen == [
-        ["0", "0", "left to right", "forward", "0.010000"],
-        ["1", "1", "right to left", "backward", "0.200000"],
+        ["0", "0", "left to right", "forward", "0.010000", "in part"],
+        ["1", "1", "right to left", "backward", "0.200000", "not measured"],
     ]
 
 

@@ -3,9 +3,11 @@
 import types
 
 import memo
+import numpy as np
 import pytest
 from conftest import shared_video
 from memo import _memo
+from memo.files import TRACK_COLUMNS
 from memo.gait import lookup
 from memo.plausible import (
     assumed_height_sentences,
@@ -13,6 +15,7 @@ from memo.plausible import (
     implausible_sentences,
     measured_height_sentences,
 )
+from memo.tracking import fit_sentence
 from memo.video import VideoReader
 
 SCENE_FRAMES = 45
@@ -111,3 +114,19 @@ def test_a_ratio_outside_its_limits_is_mentioned():
     for ratio, rate in ((0.0036, "high"), (0.0125, "low")):
         (said,) = implausible_sentences(walk(walk_ratio=_memo.WalkRatio(ratio, 0.004, 0.011)))
         assert f"frame rate is too {rate}" in said and "4.0 to 11.0 mm" in said
+
+
+def test_the_verdict_gives_its_reason():
+    angles = {name: np.ones(3) for name in TRACK_COLUMNS if name.endswith("_deg")}
+    good = {"verdict": "well", "residual_px": 0.5, "height_px": 50.0, "missed": 0.01, "worst_length_sd": 1.0}
+
+    def said(columns=angles, **values):
+        return fit_sentence(walk(fit=types.SimpleNamespace(**good | values), columns=columns))
+
+    assert said() == "The model fits the person well: its outline within 0.5 px, 1% of it not seen."
+    assert said(verdict="poorly") == (
+        "The model fits the person poorly: its outline within 0.5 px (1.0% of the person's height), 1% of it "
+        "not seen. Check the overlay before use."
+    )
+    unseen = {name: np.full(3, np.nan) for name in angles}
+    assert "No joint angle is known well enough" in said(unseen, verdict="poorly", missed=0.2)

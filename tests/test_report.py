@@ -274,6 +274,16 @@ def test_sides_that_may_be_swapped_are_not_judged(two_folders):
     assert "not judged: left and right may be swapped" in written
 
 
+def test_a_walk_that_the_model_does_not_fit_is_named(two_folders):
+    _, second = two_folders
+    run = json.loads((second / "run.json").read_text())
+    run["walks"] = [{"fit": {"measured": True, "fits": "poorly"}}]
+    (second / "run.json").write_text(json.dumps(run))
+    report = write_comparison(*two_folders)
+    said = "after: the model fits the person poorly; check its overlay before use."
+    assert said in report.contents["notes"] and said in report.path.read_text(encoding="utf-8")
+
+
 def test_walks_that_cannot_be_compared(two_folders, memo_command, posture_folder):
     first, second = two_folders
     for arguments, complaint in (
@@ -433,6 +443,14 @@ def test_what_is_assumed_or_hardly_seen_is_no_measurement(run_folder):
     written, _, _ = page_of(folder)
     assert '61.0 <small class="interval">not measured</small>' in written
     assert '<span class="status good">tracked</span>' in written
+    for fit, tone in (
+        ({"measured": True, "fits": "well"}, "good"),
+        ({"measured": True, "fits": "poorly"}, "fair"),
+        ({"measured": False, "problem": "too few frames"}, "fair"),
+    ):
+        run = json.loads((folder / "run.json").read_text()) | {"walks": [{"fit": fit}]}
+        (folder / "run.json").write_text(json.dumps(run))
+        assert f'<span class="status {tone}">tracked</span>' in page_of(folder)[0]
     table.write_text("walk,parameter,side,value,unit,ci_low,ci_high,n\n0,cadence,,40.1,1/min,-2,82.2,2\n")
     assert '<span class="status fair">tracked</span>' in page_of(folder)[0]
 

@@ -423,7 +423,8 @@ class Track:
 
     @property
     def records(self) -> list[dict[str, Any]]:
-        """Every walk: its times, direction and certainty, and what `memo.explain` needs besides the video."""
+        """Every walk: its times, direction, certainty and fit, and what `memo.explain` needs besides the
+        video."""
         return [
             {
                 "message": self._message(walk),
@@ -433,6 +434,7 @@ class Track:
                 "gait": walk.direction,
                 "p_swapped": walk.p_swapped,
                 "person": person,
+                "fit": _fit(walk),
                 **walk.record,
             }
             for walk, person in zip(self.walks, self.people, strict=True)
@@ -633,9 +635,14 @@ def fit_sentence(walk: _memo.Walk) -> str | None:
         if walk.fit_problem is None:
             return None
         return f"Its joint angles were not measured: {walk.fit_problem}."
-    seen = f"its outline within {fit.residual_px:.1f} px, {fit.missed:.0%} of it not seen"
+    missed = f"{fit.missed:.0%} of it not seen"
     if fit.verdict == "well":
-        return f"The model fits the person well: {seen}."
+        return f"The model fits the person well: its outline within {fit.residual_px:.1f} px, {missed}."
+    share = fit.residual_px / fit.height_px
+    seen = f"its outline within {fit.residual_px:.1f} px ({share:.1%} of the person's height), {missed}"
     if fit.worst_length_sd >= 3:
         seen += f", a length of the body {fit.worst_length_sd:.1f} standard deviations from the average"
-    return f"The model fits the person {fit.verdict}: {seen}. Check the overlay before use."
+    unsure = "Check the overlay before use."
+    if all(np.isnan(walk.columns[name]).all() for name in _ANGLE_COLUMNS):
+        unsure = "No joint angle is known well enough to be stated. " + unsure
+    return f"The model fits the person {fit.verdict}: {seen}. {unsure}"

@@ -22,7 +22,7 @@ STATUS_COLUMNS = ("name", "state", "walks", "attempt", "seconds", "message", "re
 _UNITS = {"1/min": "_per_min", "m": "_m", "s": "_s", "m/s": "_mps", "%": "_percent", "deg": "_deg", "": ""}
 _LEADING = (
     *("name", "state", "walk", "person", "height_m", "camera_given"),
-    *("start_s", "end_s", "direction", "gait", "p_swapped"),
+    *("start_s", "end_s", "direction", "gait", "p_swapped", "fits"),
 )
 
 
@@ -83,12 +83,20 @@ def _run(path: Path) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
                 "direction": walk["direction"],
                 "gait": walk["gait"],
                 "p_swapped": f"{walk['p_swapped']:.6f}",
+                "fits": _fits(walk.get("fit")),
             }
             for number, walk in enumerate(run["walks"])
         }
         return given, seen
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise BatchError(f"{path}: not in the format of memo track: {error!r}") from None
+
+
+def _fits(fit: dict[str, Any] | None) -> str:
+    """The verdict on the fit of a walk; empty for results of older versions, which do not have it."""
+    if fit is None:
+        return ""
+    return str(fit["fits"]) if fit["measured"] else "not measured"
 
 
 def _seconds(value: float | None) -> str:

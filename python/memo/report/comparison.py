@@ -95,6 +95,9 @@ def _p_swapped(run: RunFolder, walk: int) -> float:
 def _doubts(run: RunFolder, walk: int) -> list[str]:
     p_swapped = _p_swapped(run, walk)
     told = []
+    verdict = run.verdict(walk)
+    if verdict not in (None, "well", "not measured"):
+        told.append(f"{_name(run, walk)}: the model fits the person {verdict}; check its overlay before use.")
     if p_swapped > _LIKELY_SWAPPED:
         told.append(f"{_name(run, walk)}: left and right may be swapped (probability {p_swapped:.0%}).")
     if not (run.cycles["walk"] == walk).any():

@@ -67,6 +67,15 @@ class RunFolder:
         nearest = np.argmin(np.abs(self.columns["frame"] - event["frame"]))
         return int(event.get("walk", self.columns["walk"][nearest]))
 
+    def verdict(self, walk: int) -> str | None:
+        """How well the model fits the person: `well`, `in part`, `poorly` or `not measured`; None in results
+        of older versions."""
+        walks = self.run.get("walks") or []
+        fit = walks[walk].get("fit") if 0 <= walk < len(walks) else None
+        if not isinstance(fit, dict):
+            return None
+        return str(fit.get("fits")) if fit.get("measured") else "not measured"
+
     @property
     def first_frame(self) -> int:
         """Number in the video of the first frame the run read."""

@@ -58,6 +58,8 @@ def _status(run: RunFolder) -> tuple[str, str]:
     if not run.frames:
         return told, "bad"
     doubtful = any(p_swapped > _LIKELY_SWAPPED for _, p_swapped in _swapped(run)) or _unsteady(run)
+    walks = dict.fromkeys(run.columns["walk"].tolist())
+    doubtful = doubtful or any(run.verdict(walk) not in (None, "well") for walk in walks)
     return told, "fair" if doubtful or told != "tracked" else "good"
 
 
