@@ -1,6 +1,7 @@
 """`memo convert`, and motion files given to `memo pointlight`: what is said, written and refused."""
 
 import csv
+import io
 import json
 import os
 from pathlib import Path
@@ -91,7 +92,8 @@ def test_angles_for_gait2392_have_its_signs_and_no_arms(tmp_path, memo_command):
     assert code == 0
     arms = "right_shoulder, right_elbow, left_shoulder, left_elbow"
     assert f"The model has no arms: {arms} left out." in out
-    rows = {path: np.genfromtxt(path, skip_header=7, names=True) for path in (usual, target)}
+    tables = {path: path.read_text().partition("endheader\n")[2] for path in (usual, target)}
+    rows = {path: np.genfromtxt(io.StringIO(told), names=True) for path, told in tables.items()}
     np.testing.assert_allclose(rows[target]["knee_angle_r"], -rows[usual]["knee_angle_r"])
     np.testing.assert_allclose(rows[target]["hip_flexion_r"], rows[usual]["hip_flexion_r"])
     assert "elbow_flex_r" not in rows[target].dtype.names
@@ -115,6 +117,29 @@ def test_clinical_hips_are_against_the_pelvis(tmp_path, memo_command):
     np.testing.assert_allclose(raised.angles["right_knee"], plain.angles["right_knee"])
     code, _, err = memo_command("convert", target, tmp_path / "b.mot", "--clinical")
     assert code == 1 and "need a folder of `memo track`" in err
+
+
+def test_files_with_angles_state_their_references(tmp_path, memo_command):
+    write_track(tmp_path / "run")
+    against = {
+        "": "thigh against the vertical",
+        "--clinical": "thigh against a pelvis tilted forwards by 11.4",
+    }
+    for option, hip in against.items():
+        for name in ("walk.mot", "walk.c3d"):
+            code, _, _ = memo_command(
+                "convert", tmp_path / "run", tmp_path / name, "--walk", 0, *[option] * bool(option)
+            )
+            assert code == 0
+        head = (tmp_path / "walk.mot").read_text().partition("endheader")[0].splitlines()
+        assert any(line.startswith(f"hip_flexion_r: {hip}") for line in head)
+        assert "knee_angle_l: shank against thigh, 0 if straight" in head
+        point = ezc3d.c3d(str(tmp_path / "walk.c3d"))["parameters"]["POINT"]
+        said = dict(zip(point["LABELS"]["value"], point["DESCRIPTIONS"]["value"], strict=True))
+        assert (
+            said["LHipAngles"].startswith(hip) and said["RKneeAngles"] == "shank against thigh, 0 if straight"
+        )
+        assert said["right_hip"] == ""
 
 
 def test_plug_in_gait_states_hips_against_the_pelvis():

@@ -13,8 +13,9 @@ or ends in one `FormatError`.
 Conventions: the time of the first frame is (its number - 1) / rate, as Vicon counts, and events (group
 EVENT, labels `Foot Strike` and `Foot Off`, contexts `Right` and `Left`) are on the same clock; of other
 events only the number is reported. Points that POINT:ANGLES names are joint angles in degrees,
-`RKneeAngles` with flexion in X; those that FORCES, MOMENTS, POWERS and SCALARS name, and analog channels,
-are left out. POINT:Y_SCREEN names the up axis; without it, it is the axis along which the figure stands.
+`RKneeAngles` with flexion in X, and POINT:DESCRIPTIONS says what each is between; those that FORCES, MOMENTS,
+POWERS and SCALARS name, and analog channels, are left out. POINT:Y_SCREEN names the up axis; without it, it
+is the axis along which the figure stands.
 Frames beyond 65535 are counted by TRIAL:ACTUAL_END_FIELD; labels and events beyond 255 continue in LABELS2,
 TIMES2 and so on.
 """
@@ -479,6 +480,8 @@ def _parameter_groups(
     frames = len(motion.times_s)
     names = [label for label, _ in labels]
     angles = [label for label, is_angle in labels if is_angle]
+    references = motion.metadata.get("references", {})
+    descriptions = [references.get(_OURS.get(name, name), "") if own else "" for name, own in labels]
     split = [(value & 0xFFFF, value >> 16) for value in (first, first + frames - 1)]
     return {
         "TRIAL": [
@@ -496,7 +499,7 @@ def _parameter_groups(
             _characters("X_SCREEN", ["+X"]),
             _characters("Y_SCREEN", [f"+{up.upper()}"]),
             *_many("LABELS", names),
-            *_many("DESCRIPTIONS", [""] * len(names)),
+            *_many("DESCRIPTIONS", descriptions),
             *((*_many("ANGLES", angles), _characters("ANGLE_UNITS", ["deg"])) if angles else ()),
         ],
         "ANALOG": [

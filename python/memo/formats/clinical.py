@@ -37,4 +37,7 @@ def clinical(motion: Motion) -> Motion:
         f"Hip angles are relative to a pelvis with the average tilt of {average} degrees (people differ by"
         f" {sd}): the level of the hip curves is not measured."
     )
-    return replace(motion, angles=angles, notes=(*motion.notes, note))
+    reference = f"thigh against a pelvis tilted forwards by {average} degrees, the average of adults"
+    hips = {name: reference for name in ("right_hip", "left_hip") if name in angles}
+    metadata = {**motion.metadata, "references": {**motion.metadata.get("references", {}), **hips}}
+    return replace(motion, angles=angles, metadata=metadata, notes=(*motion.notes, note))

@@ -1,8 +1,9 @@
 """MOT and STO (OpenSim, SIMM): joint angles over time, as text.
 
 A header of `key=value` lines up to `endheader`, a row of labels that begins with `time`, one row per
-instant; `nColumns` counts the time. Both endings have the same format here. The older header of SIMM
-(`datacolumns`, `datarows`) is read too.
+instant; `nColumns` counts the time. Other lines of the header say what each angle is between, as far as that
+is known. Both endings have the same format here. The older header of SIMM (`datacolumns`, `datarows`) is read
+too.
 
 Angles have the names of OpenSim's gait models (`hip_flexion_r`, `knee_angle_r`) and are written in degrees.
 Flexion is positive as in the model of Rajagopal 2016. For gait2392 and gait2354 (`GAIT2392`) the knee has the
@@ -27,6 +28,7 @@ reversed. Tables of vectors (`DataType=Vec3`) are not read.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -177,6 +179,7 @@ def write_mot(path: Path, motion: Motion, up: Up, model: Model = RAJAGOPAL) -> l
         f"nColumns={len(columns)}",
         "inDegrees=yes",
         f"up={up.upper()}",
+        *_references(motion, columns),
         "endheader",
         "\t".join(columns),
     ]
@@ -198,6 +201,13 @@ def write_mot(path: Path, motion: Motion, up: Up, model: Model = RAJAGOPAL) -> l
     if armless:
         notes.append(f"The model has no arms: {', '.join(armless)} left out.")
     return notes + [f"A MOT or STO file cannot store {what}: left out." for what in left_out]
+
+
+def _references(motion: Motion, columns: Collection[str]) -> list[str]:
+    """Lines of text, as OpenSim's own files have them in the header: what the angles are between."""
+    known = motion.metadata.get("references", {})
+    named = {OPENSIM[name]: said for name, said in known.items() if OPENSIM.get(name) in columns}
+    return [f"{name}: {said}" for name, said in named.items()]
 
 
 def _of_model(motion: Motion, model: Model) -> tuple[Motion, list[str]]:

@@ -72,7 +72,8 @@ class Motion:
     angles: Mapping[str, Array] = field(default_factory=dict)
     """Joint angles (T,) in degrees, NaN where missing: `right_knee` is flexion, as in `track.csv`."""
     metadata: Mapping[str, Any] = field(default_factory=dict)
-    """Other facts in the file: `format`, `up`, `unit`, `rate_hz`."""
+    """Other facts in the file: `format`, `up`, `unit`, `rate_hz`; and `references`, what each joint angle is
+    between, by the name of the angle, if it is known."""
     notes: tuple[str, ...] = ()
     """Assumptions and omissions in reading, in sentences."""
 

@@ -6,7 +6,8 @@ For formats that need a frame at every instant, those frames are empty.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,18 @@ from memo.formats.table import read_table
 from memo.wording import counted
 
 __all__ = ["read_run_folder", "sources"]
+
+_OF_BOTH = {
+    "knee": "shank against thigh, 0 if straight",
+    "ankle": "foot against shank, 0 at a right angle, dorsiflexion positive",
+    "shoulder": "upper arm against trunk, 0 along it",
+    "elbow": "forearm against upper arm, 0 if straight",
+}
+_REFERENCES = {
+    "track": {"hip": "thigh against the vertical, 0 if vertical", **_OF_BOTH},
+    "postures": {"hip": "thigh against trunk, 0 along it", **_OF_BOTH},
+}
+"""What the angles of `track.csv` and `postures.csv` are between: docs/reference/conventions.md."""
 
 
 def sources(path: Path) -> list[Path]:
@@ -41,7 +54,15 @@ def read_run_folder(path: Path, given: Given, walk: int | None) -> Motion:
         return _track(table, others[0], walk)
     if walk is not None:
         raise FormatError("a walk can be chosen only for track.csv")
-    return read_table(table, given)
+    motion = read_table(table, given)
+    return replace(motion, metadata={**motion.metadata, "references": _references("postures", motion.angles)})
+
+
+def _references(source: str, angles: Iterable[str]) -> dict[str, str]:
+    """The references of those angles whose references are known."""
+    known = _REFERENCES[source]
+    joints = {name: name.partition("_")[2] for name in angles}
+    return {name: known[joint] for name, joint in joints.items() if joint in known}
 
 
 def _track(table: Path, events_table: Path, walk: int | None) -> Motion:
@@ -77,7 +98,7 @@ def _track(table: Path, events_table: Path, walk: int | None) -> Motion:
         for event in events
         if walk is None or (event.get("walk", walk) == walk and times_s[0] <= event["time_s"] <= times_s[-1])
     ]
-    metadata = {"format": "track", "up": "z", "unit": "m"}
+    metadata = {"format": "track", "up": "z", "unit": "m", "references": _references("track", angles)}
     return Motion(names, times_s, points, tuple(kept), angles, metadata, tuple(notes))
 
 
