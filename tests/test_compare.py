@@ -38,6 +38,12 @@ def test_intervals_are_combined_and_decide():
     assert difference_sentences(("A", "B"), [step, stride, speed], []) == [
         "Step length: 0.060 m (0.010 to 0.110) larger in B than in A."
     ]
+    [nearly] = parameter_differences(
+        parameters(step_length=(0.6, 0.0)), parameters(step_length=(0.66, 0.0598)), (0, 0)
+    )
+    assert nearly.is_sure and difference_sentences(("A", "B"), [nearly], []) == [
+        "No difference between the two walks can be told."
+    ]
 
 
 def test_curves_differ_where_their_interval_excludes_zero():

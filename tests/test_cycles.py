@@ -120,6 +120,7 @@ def test_departures_are_said_with_their_interval():
         "healthy adults at 71 % of the cycle, and surely outside for 31% of it."
     )
     assert "more flexed" in departure_sentences([_memo.Departure("right", "hip", 6.0, 2.0, 3, 0.1)])[0]
+    assert departure_sentences([_memo.Departure("right", "hip", 6.0, 5.7, 3, 0.1)]) == []  # "6° (0 to 12)"
 
 
 def test_average_walking_is_the_clinical_average_lowered_to_joint_centres():

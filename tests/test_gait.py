@@ -152,6 +152,10 @@ def test_only_what_excludes_zero_is_said():
     ]
     wide = lines((*row[:2], 0.1 if row[1] == "left" else row[2], *row[3:]) for row in ROWS)
     assert symmetry_sentences(gait_table([wide]), 0)[0].startswith("The left step is 60 cm shorter")
+    nearly = lines(
+        (*row[:4], 0.3, row[5], row[6]) if row[0] == "step_length_symmetry" else row for row in ROWS
+    )
+    assert symmetry_sentences(gait_table([nearly]), 0) == []  # its interval would read "0 to 17"
     unknown = lines((*row[:2], np.nan, row[3], np.nan, np.nan, 0) for row in ROWS)
     assert symmetry_sentences(gait_table([LINES, unknown]), 1) == []
 

@@ -18,6 +18,7 @@ import numpy.typing as npt
 from memo.cycles import mean_cycle
 from memo.files import ANGLES, SIDES
 from memo.gait import GAIT_COLUMNS
+from memo.wording import shows_zero
 
 __all__ = [
     "JUDGED",
@@ -131,11 +132,14 @@ def curve_differences(first: Table, second: Table, walks: tuple[int, int]) -> li
 def difference_sentences(
     names: tuple[str, str], parameters: Iterable[ParameterDifference], curves: Iterable[CurveDifference]
 ) -> list[str]:
-    """Reports only differences whose interval excludes zero; one sentence if there are none."""
+    """Reports only differences whose interval excludes zero, also as it is printed; one sentence if there are
+    none."""
     said = []
     for one in (one for one in parameters if one.is_sure):
         row, size = one.first, abs(one.value)
         digits = 1 if row["unit"] in ("%", "1/min", "deg") else 3
+        if shows_zero(size - one.half, digits):
+            continue
         unit = {"deg": "°", "": ""}.get(str(row["unit"]), f" {row['unit']}")
         side = f", {row['side']}" if row["side"] else ""
         said.append(
@@ -145,6 +149,8 @@ def difference_sentences(
         )
     for curve in (curve for curve in curves if curve.is_sure):
         percent, value, half = curve.largest
+        if shows_zero(abs(value) - half, 0):
+            continue
         said.append(
             f"The {curve.side} {curve.joint} is {abs(value):.0f}° ({abs(value) - half:.0f} to "
             f"{abs(value) + half:.0f}) {'more' if value > 0 else 'less'} flexed in {names[1]} than in "

@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from memo.files import ANGLES, read_typed_columns, write_columns_csv
+from memo.wording import shows_zero
 
 if TYPE_CHECKING:
     from memo._memo import Departure, GaitCycle
@@ -105,11 +106,13 @@ def mean_cycle(
 
 
 def departure_sentences(departures: Iterable[Departure]) -> list[str]:
-    """Reports each joint whose mean cycle is outside of average walking with its whole interval."""
+    """Reports each joint whose mean cycle is outside of average walking with its whole interval, also as
+    printed."""
     return [
         f"The {d.side} {d.joint} is {'more' if d.excess_deg > 0 else 'less'} flexed than in average walking: "
         f"{abs(d.excess_deg):.0f}° ({abs(d.excess_deg) - d.half_deg:.0f} to "
         f"{abs(d.excess_deg) + d.half_deg:.0f}) outside the band of healthy adults at {d.at_percent} % of "
         f"the cycle, and surely outside for {d.share:.0%} of it."
         for d in departures
+        if not shows_zero(abs(d.excess_deg) - d.half_deg, 0)
     ]

@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from memo.files import read_typed_columns, write_columns_csv
+from memo.wording import shows_zero
 
 if TYPE_CHECKING:
     from memo._memo import GaitParameter
@@ -122,7 +123,7 @@ def cadence_sentences(table: Mapping[str, npt.NDArray[Any]], walk: int) -> list[
 
 
 def symmetry_sentences(table: Mapping[str, npt.NDArray[Any]], walk: int) -> list[str]:
-    """Reports a difference between the sides, only if its interval excludes zero."""
+    """Reports a difference between the sides, only if its interval excludes zero, also as it is printed."""
     said = []
     for parameter, unit, per_unit, digits in (("step_length", "cm", 100, 0), ("step_time", "s", 1, 2)):
         symmetry = lookup(table, walk, f"{parameter}_symmetry")
@@ -132,6 +133,8 @@ def symmetry_sentences(table: Mapping[str, npt.NDArray[Any]], walk: int) -> list
         less, more = ("left", "right") if right > left else ("right", "left")
         by = per_unit * abs(right - left)
         ends = sorted(abs(symmetry[end]) * (right + left) / 200 * per_unit for end in ("ci_low", "ci_high"))
+        if shows_zero(ends[0], digits):
+            continue
         said.append(
             f"The {less} step {'is' if unit == 'cm' else 'takes'} {by:.{digits}f} {unit} "
             f"{'shorter' if unit == 'cm' else 'less'} than the {more} "

@@ -1,13 +1,18 @@
-"""Counts in messages."""
+"""Counts and intervals in messages."""
 
 from __future__ import annotations
 
 from typing import SupportsInt
 
-__all__ = ["counted"]
+__all__ = ["counted", "shows_zero"]
 
 
 def counted(count: SupportsInt, one: str, several: str | None = None) -> str:
     """A count with its noun: "1 frame", "2 frames", "2 branches" if that plural is given."""
     number = int(count)
     return f"{number} {one if number == 1 else several or f'{one}s'}"
+
+
+def shows_zero(value: float, digits: int) -> bool:
+    """Whether a number reads as zero with that many digits: then its interval touches zero in print."""
+    return float(f"{value:.{digits}f}") == 0
