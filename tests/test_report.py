@@ -439,8 +439,9 @@ def test_what_is_assumed_or_hardly_seen_is_no_measurement(run_folder):
     track = read_track_csv(folder / "track.csv")
     write_track_csv(folder / "track.csv", track | {"p_swapped": 0 * track["p_swapped"]})
     table = folder / "gait_parameters.csv"
-    table.write_text(table.read_text() + "0,stance,,61.0,%,,,0\n")
+    table.write_text(table.read_text() + "0,stance,,61.0,%,,,0\n0,knee_peak,right,58.049,deg,50.126,66,2\n")
     written, _, _ = page_of(folder)
+    assert '58.0 <small class="interval">50.1 to 66.0 (n = 2)</small>' in written
     assert '61.0 <small class="interval">not measured</small>' in written
     assert '<span class="status good">tracked</span>' in written
     for fit, tone in (

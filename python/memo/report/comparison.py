@@ -20,7 +20,7 @@ from memo.report import normative
 from memo.report.cycles import drawn_cycles
 from memo.report.page import Page, number, rows_table, text
 from memo.report.run_folder import RunFolder, read_run_folder
-from memo.report.track_text import measured
+from memo.report.track_text import digits_of, measured
 from memo.wording import counted
 
 __all__ = ["comparison_page"]
@@ -137,7 +137,7 @@ def _difference(one: ParameterDifference) -> str:
     """The difference with its interval, and whether it can be told, as HTML."""
     if not np.isfinite(one.value):
         return number(one.value)
-    digits = 1 if one.first["unit"] in ("%", "1/min") else 3
+    digits = digits_of(one.first["unit"])
     interval = f"{number(one.value - one.half, digits)} to {number(one.value + one.half, digits)}"
     told = "" if one.is_sure else f"; {_NO_DIFFERENCE}"
     return f'{number(one.value, digits)} <small class="interval">{interval}{told}</small>'

@@ -16,7 +16,7 @@ from memo.report.pictures import Picture
 from memo.report.run_folder import RunFolder
 from memo.wording import counted
 
-__all__ = ["measured", "track_text"]
+__all__ = ["digits_of", "measured", "track_text"]
 
 _DEEPEST = 4
 _LIKELY_SWAPPED = 0.2
@@ -229,9 +229,14 @@ def _of_walk(run: RunFolder, walk: int, lines: list[dict[str, Any]]) -> str:
     return rows_table(f"{name}: value, 95 % interval, number of steps", header, rows)
 
 
+def digits_of(unit: str) -> int:
+    """Digits after the point of a gait parameter in this unit."""
+    return 1 if unit in ("%", "1/min", "deg") else 3
+
+
 def measured(line: Mapping[str, Any]) -> str:
     """A value with its interval and the number of steps it is based on, as HTML."""
-    digits = 1 if line["unit"] in ("%", "1/min") else 3
+    digits = digits_of(line["unit"])
     value = number(line["value"], digits)
     if line["n"] == 0:
         return f'{value} <small class="interval">not measured</small>'
