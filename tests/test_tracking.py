@@ -278,3 +278,11 @@ def test_times_and_frames_must_match_in_number():
         memo.track(frames, times_s=[0.0, 0.1], height_m=1.7)
     with pytest.raises(ValueError, match="times_s has more values than the 3 frames"):
         memo.track(frames, times_s=[0.0, 0.1, 0.2, 0.3], height_m=1.7)
+
+
+def test_too_few_frames_are_said_with_their_number():
+    frames = memo.demo_scene(0, frames=9).frames
+    assert memo.track(frames, fps=25, height_m=1.7).summary["message"] == (
+        "Nobody was seen walking: something moves in only 9 frames, and a walk is found in 13."
+    )
+    assert memo.track([frames[0]] * 9, fps=25, height_m=1.7).summary["message"] == "Nobody was seen walking."

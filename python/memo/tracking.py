@@ -493,7 +493,7 @@ class Track:
         if main is None:
             return {
                 "status": self._why_nobody(),
-                "message": _NOBODY[self._why_nobody()],
+                "message": self._nobody_message(),
                 "walks": 0,
                 "people": 0,
                 "camera_motion": self.camera_motion.summary,
@@ -568,6 +568,16 @@ class Track:
         if seek.frames_cut_off > 0.5 * seek.frames_with_candidate:
             return "never fully visible"
         return "nobody"
+
+    def _nobody_message(self) -> str:
+        moving, needed = self.seek_report.frames_with_candidate, int(_memo.defaults("track")["start_frames"])
+        why = self._why_nobody()
+        if why == "nobody" and 0 < moving < needed:
+            return (
+                f"Nobody was seen walking: something moves in only {counted(moving, 'frame')}, and a walk is "
+                f"found in {needed}."
+            )
+        return _NOBODY[why]
 
     def to_pandas(self, table: str = "columns") -> pandas.DataFrame:
         """A table as a `pandas.DataFrame`: "columns" (one row per frame), "gait_parameters" or "cycles"."""
