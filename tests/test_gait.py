@@ -204,6 +204,19 @@ def test_walks_of_one_person_have_the_same_number(tmp_path):
     assert tuple(old) == GAIT_COLUMNS and old["person"].tolist() == old["walk"].tolist() == [3]
 
 
+def test_without_a_fit_no_difference_is_reported(monkeypatch):
+    scene = memo.demo_scene(2, frames=60)
+    track = memo.track(scene.frames, times_s=scene.times_s, height_m=scene.height_m, camera=scene.camera)
+    said = "The left step is 39 cm shorter than the right (20 to 57)."
+    monkeypatch.setattr(tracking, "symmetry_sentences", lambda table, walk: [said])
+    monkeypatch.setattr(tracking, "departure_sentences", lambda departures: ["The left knee is less flexed."])
+    assert said in track.sentences and "The left knee is less flexed." in track.sentences
+    empty = np.median(scene.frames, axis=0).astype(np.uint8)
+    lost = memo.Track([memo.fit_walk(track.walks[0], [empty] * len(scene.frames))], track.seek_report)
+    assert any("were not measured" in sentence for sentence in lost.sentences)
+    assert said not in lost.sentences and "The left knee is less flexed." not in lost.sentences
+
+
 def test_the_command_line_says_it_and_writes_it(tmp_path, monkeypatch, capsys):
     clip = shared_video("mocap_a")
     arguments = ["track", clip / "video.mp4", "--height", "1.86", "--out", tmp_path, "--no-overlay"]

@@ -8,7 +8,7 @@ pixel of the pictures that were tracked), `pixels_of` ("video": the unit of the 
 `camera`), `camera_given`, `camera` (of the video: the camera given, or the one assumed for the longest walk;
 the keys of a Pose2Sim TOML, and for Tsai's lens `tsai_kappa` with the distortions nearest to it; null if
 nobody was tracked without a camera), `options` (of `Tracker`), `summary` and `sentences` (of `Track`),
-`walks` (per walk `message`, `start_s`, `end_s`, `direction`, `gait`, `p_swapped`, and the input of
+`walks` (per walk `message`, `start_s`, `end_s`, `direction`, `gait`, `p_swapped`, `fit`, and the input of
 `memo.explain` and `contours_of_run`: pixels there are those of the pictures that were tracked, and frames are
 counted from the first one read).
 

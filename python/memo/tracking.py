@@ -410,9 +410,9 @@ class Track:
             if walk.p_swapped > LIKELY_SWAPPED:
                 chance = f"probability {walk.p_swapped:.0%}"
                 told.append(f"Left and right may be swapped ({chance}): check them before use.")
-            told += [] if unseen else symmetry_sentences(self.gait_parameters, index)
-            if walk.p_swapped <= LIKELY_SWAPPED:
-                told += departure_sentences(walk.departures)
+            if _is_in_place(walk):
+                told += [] if unseen else symmetry_sentences(self.gait_parameters, index)
+                told += departure_sentences(walk.departures) if walk.p_swapped <= LIKELY_SWAPPED else []
             whose = ""
             if len(self.walks) > 1:
                 whose = f"Walk {index + 1} of {len(self.walks)} (person {self.people[index] + 1}): "
@@ -636,6 +636,12 @@ def _fit(walk: _memo.Walk) -> dict[str, Any]:
         "worst_length_sd": fit.worst_length_sd,
         "lengths_m": fit.lengths_m,
     }
+
+
+def _is_in_place(walk: _memo.Walk) -> bool:
+    """Whether a difference of the sides or from average walking can be due to the person: not if the fit
+    failed or is poor, as where one leg is hidden."""
+    return walk.fit.verdict != "poorly" if walk.fit is not None else walk.fit_problem is None
 
 
 def fit_sentence(walk: _memo.Walk) -> str | None:
