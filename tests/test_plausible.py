@@ -119,6 +119,7 @@ def test_a_ratio_outside_its_limits_is_mentioned():
 def test_the_verdict_gives_its_reason():
     angles = {name: np.ones(3) for name in TRACK_COLUMNS if name.endswith("_deg")}
     good = {"verdict": "well", "residual_px": 0.5, "height_px": 50.0, "missed": 0.01, "worst_length_sd": 1.0}
+    good |= {"is_beside_the_crown": False, "crown_off": 0.004}
 
     def said(columns=angles, **values):
         return fit_sentence(walk(fit=types.SimpleNamespace(**good | values), columns=columns))
@@ -130,3 +131,31 @@ def test_the_verdict_gives_its_reason():
     )
     unseen = {name: np.full(3, np.nan) for name in angles}
     assert "No joint angle is known well enough" in said(unseen, verdict="poorly", missed=0.2)
+
+
+@pytest.mark.parametrize("share", [0.9, 1.1])
+def test_a_wrong_height_is_told_from_the_picture(share):
+    """The model of a small person ends at the neck of a tall one, unless the crown of the person is seen."""
+    scene = memo.demo_scene(8, frames=90)
+    given_m = share * scene.height_m
+    (walk,) = memo.track(scene.frames, fps=25, camera=scene.camera, height_m=given_m).walks
+    assert walk.height_is_contradicted
+    assert walk.measured_height.height_m == pytest.approx(scene.height_m, abs=0.05)
+    assert not walk.fit.is_beside_the_crown and walk.fit.crown_off < 0.03
+    (said,) = contradiction_sentences(walk)
+    assert f"The given height of {given_m:.2f} m contradicts the picture" in said
+
+
+def test_a_head_below_the_person_s_is_named():
+    fit = types.SimpleNamespace(
+        verdict="poorly",
+        residual_px=0.5,
+        height_px=200.0,
+        missed=0.01,
+        worst_length_sd=1.0,
+        is_beside_the_crown=True,
+        crown_off=0.15,
+    )
+    angles = {name: np.array([1.0]) for name in TRACK_COLUMNS if name.endswith("_deg")}
+    said = fit_sentence(types.SimpleNamespace(fit=fit, columns=angles))
+    assert "its head 15% of the height below the person's" in said

@@ -634,6 +634,7 @@ def _fit(walk: _memo.Walk) -> dict[str, Any]:
         "outline_off_px": fit.residual_px,
         "outline_missed_percent": 100 * fit.missed,
         "worst_length_sd": fit.worst_length_sd,
+        "crown_off_percent": None if fit.crown_off is None else 100 * fit.crown_off,
         "lengths_m": fit.lengths_m,
     }
 
@@ -658,6 +659,9 @@ def fit_sentence(walk: _memo.Walk) -> str | None:
     seen = f"its outline within {fit.residual_px:.1f} px ({share:.1%} of the person's height), {missed}"
     if fit.worst_length_sd >= 3:
         seen += f", a length of the body {fit.worst_length_sd:.1f} standard deviations from the average"
+    if fit.is_beside_the_crown and fit.crown_off is not None:
+        where = "below" if fit.crown_off > 0 else "above"
+        seen += f", its head {abs(fit.crown_off):.0%} of the height {where} the person's"
     unsure = "Check the overlay before use."
     if all(np.isnan(walk.columns[name]).all() for name in _ANGLE_COLUMNS):
         unsure = "No joint angle is known well enough to be stated. " + unsure

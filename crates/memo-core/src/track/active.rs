@@ -299,6 +299,16 @@ impl Active {
         Some(self.tracked(options).fit(views, fit, p_swapped))
     }
 
+    /// Row of the crown in each frame by the changes, pixels.
+    pub(super) fn crowns_px(&self) -> Vec<Option<f64>> {
+        let known: HashMap<usize, f64> =
+            self.pieces.iter().filter_map(|piece| Some((piece.frame, piece.crown_px?))).collect();
+        if self.pieces.is_empty() {
+            return Vec::new();
+        }
+        self.steps().iter().map(|step| known.get(&step.frame).copied()).collect()
+    }
+
     /// What a fit starts from.
     fn tracked<'a>(&'a self, options: &'a TrackerOptions) -> Tracked<'a> {
         Tracked {
@@ -515,8 +525,13 @@ pub(super) mod tests {
     fn the_fit_is_told_how_much_of_the_person_each_frame_shows() {
         let mut walk = ending(40, 1.2, 0.9, 0.5);
         walk.walk.twins[0].steps.iter_mut().for_each(|step| step.visible = step.frame as f32 / 64.0);
-        let view =
-            View { corner: [0, 0], grey: Image::filled(1, 1, 0), background: None, others: Vec::new() };
+        let view = View {
+            corner: [0, 0],
+            grey: Image::filled(1, 1, 0),
+            background: None,
+            others: Vec::new(),
+            crown_px: None,
+        };
         let options = options();
         let frames = walk.tracked(&options).frames(vec![view; 40]);
         assert_eq!(frames.len(), 40);

@@ -52,6 +52,13 @@ pub struct Sighting {
     pub rectangle: Rectangle,
 }
 
+impl Sighting {
+    /// Row of the crown, pixels.
+    pub(super) fn crown_px(&self) -> f64 {
+        self.rectangle.top as f64 + MASK_MARGIN_PX
+    }
+}
+
 /// The 5x5 windows of eq. (1) mark pixels this far outside the person's upper edge.
 pub(super) const MASK_MARGIN_PX: f64 = 2.0;
 /// Shadows and reflections move the bottom row down and nothing moves it up, so a low quantile is the row of the

@@ -51,6 +51,9 @@ pub struct TrackedWalk {
     /// Whether the person walks towards the camera or away from it: then the feet show place and phase, left and right
     /// stay open, and the angles are those of the average gait.
     pub is_frontal: bool,
+    /// Row of the crown in each row by the changes, pixels; `None` where they do not show the person alone. Empty without
+    /// a fit.
+    pub crowns_px: Vec<Option<f64>>,
     /// The fit of the person, or why there is none; `None` if none was asked for.
     pub fit: Option<Result<WalkFit, FitError>>,
     /// The options used.

@@ -401,7 +401,8 @@ impl Tracker {
             let active = &mut self.people[k];
             active.walk.follow(&edges, &active.camera, &self.options.walk);
             if self.options.fit.is_some() {
-                active.pieces.push(Piece::new(evidence.frame, &evidence.grey, own.window, others));
+                let piece = Piece::new(evidence.frame, &evidence.grey, own.window, others);
+                active.pieces.push(piece.with_crown(sighting.as_ref()));
                 self.backdrop.occupy(evidence.frame, own.window);
             }
             if let Some(frontal) = &active.frontal {
@@ -428,6 +429,7 @@ impl Tracker {
             self.people.insert(k, active);
         }
         self.people[k].settle(&self.backdrop, &self.options);
+        self.standing = Standing::default();
     }
 
     /// Ends walks that are over. On a wrong path a walk can seem to be over, so a turn is looked for first.
@@ -545,7 +547,9 @@ impl Tracker {
         }
         let piece = self.options.fit.map(|_| {
             self.backdrop.occupy(evidence.frame, sighting.rectangle);
+            let alone = (!edges.shared).then_some(&sighting);
             Piece::new(evidence.frame, &evidence.grey, sighting.rectangle, edges.others.clone())
+                .with_crown(alone)
         });
         Ok(Seen { sighting, edges, piece })
     }
@@ -646,6 +650,7 @@ impl Tracker {
         self.finished.push(TrackedWalk {
             person: active.person,
             camera_turns: active.turns(self.stream.camera_motions()),
+            crowns_px: active.crowns_px(),
             walk: active.walk,
             height,
             camera: active.camera,

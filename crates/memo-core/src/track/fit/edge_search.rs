@@ -22,6 +22,8 @@ pub struct View {
     pub background: Option<Image<u8>>,
     /// The bodies of other people near it.
     pub others: Vec<EllipticCylinder>,
+    /// Row of the crown by the changes, pixels; `None` where they do not show the person alone.
+    pub crown_px: Option<f64>,
 }
 
 /// What kind of line is searched.
@@ -135,7 +137,7 @@ mod tests {
             grey.row_mut(y)[40..45].fill(20);
             background.row_mut(y)[40..45].fill(20);
         }
-        View { corner: [100, 50], grey, background: Some(background), others: Vec::new() }
+        View { corner: [100, 50], grey, background: Some(background), others: Vec::new(), crown_px: None }
     }
 
     fn found(view: &View, x: f64, border: Border) -> FoundEdge {

@@ -7,7 +7,7 @@ use super::super::steady;
 use super::super::walk::{Step, Walk};
 use super::edge_search::View;
 use super::views::{Backdrop, Piece};
-use super::{FitError, FitFrame, FitOptions, Problem, WalkFit, fit_on_the_spot, fitted_route};
+use super::{FitError, FitFrame, FitOptions, FitVerdict, Problem, WalkFit, fit_on_the_spot, fitted_route};
 use crate::calibrate::TiltEstimate;
 use crate::estimate::kalman::FilterOptions;
 use crate::image::Image;
@@ -52,11 +52,25 @@ impl Tracked<'_> {
             fit
         };
         if !self.is_on_treadmill {
-            return problem(route).fit(p_swapped).map(with_tilt);
+            let fit = problem(route).fit(p_swapped)?;
+            return Ok(with_tilt(self.with_height_of_its_own(fit, problem(route))));
         }
         let mirrored = mirrored(&route.at(0.0), self.camera).into();
         let [here, there] = [route, &mirrored].map(|route| problem(route).on_treadmill());
         fit_on_the_spot(&here, &there, p_swapped).map(with_tilt)
+    }
+
+    /// The same with the height that the picture shows if the given one is far from it: the fit near the given height
+    /// tells that it is wrong, but not by how much.
+    fn with_height_of_its_own(&self, fit: WalkFit, problem: Problem<'_>) -> WalkFit {
+        let is_given = self.height.source == HeightSource::Given && self.tilt.is_none();
+        let is_off = fit.quality.verdict() != FitVerdict::Well
+            || fit.height.is_some_and(|seen| self.height.contradicts(&seen));
+        let height = || problem.of_height(&BodyHeight::POPULATION).fit(None).ok()?.height;
+        match (is_given && is_off).then(height).flatten() {
+            Some(seen) => WalkFit { height: Some(seen), ..fit },
+            None => fit,
+        }
     }
 
     /// The frames to be fitted, in their views, from where the smoothed track has the person.
@@ -134,7 +148,8 @@ impl TrackedWalk {
             let picture = turned_back(k);
             backdrop.push(k, &picture);
             backdrop.occupy(k, step.look.window);
-            pieces.push(Piece::new(k, &picture, step.look.window, Vec::new()));
+            let piece = Piece::new(k, &picture, step.look.window, Vec::new());
+            pieces.push(Piece { crown_px: self.crowns_px.get(k).copied().flatten(), ..piece });
         }
         let views = match empty {
             Some(empty) => pieces.into_iter().map(|piece| piece.before(empty)).collect(),

@@ -16,11 +16,13 @@ use super::{
     FitError, FitOptions, FitQuality, FittedFrame, LEAST_FRAMES, Measured, WalkFit, belt, contacts, sides,
 };
 use crate::estimate::arrow::{Arrow, Solution, velocity_change};
+use crate::estimate::median::median;
+use crate::model::body::Part;
 use crate::model::{Camera, Gait, GaitStyle, Walker};
 use crate::track::height::{BodyHeight, HeightSource};
 use crate::track::route::Route;
 use crate::track::search::{Hypothesis, Path};
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
@@ -383,11 +385,39 @@ impl<'a> Problem<'a> {
                 weight,
             );
         }
+        // The head ends where the changes do, but for what hair and the windows of the change detection make of it.
+        if let Some((crown, off_px)) = view.crown_px.and_then(|crown_px| self.crown(&figure, crown_px)) {
+            let free_px = CROWN_FREE * width.height_px;
+            let beyond_px = off_px - off_px.clamp(-free_px, free_px);
+            let weight = if beyond_px == 0.0 { 0.0 } else { (CROWN_SD * width.height_px).powi(-2) };
+            figure.motion(&crown, motion);
+            let n_j = gradient(self.camera, crown.world, crown.normal);
+            let slopes = motion.iter().map(|(q, dx)| (*q, n_j.dot(*dx)));
+            add_terms(&mut normal, &mut right, slopes, beyond_px, weight);
+        }
         // The lower foot stands on the ground, with an error common to about ten independent frames.
         let (side, lowest) = figure.lowest_point();
         let weight = self.ground_sd_m.powi(-2) / (self.frames.len() as f64 / GROUND_FRAMES).max(1.0);
         add_terms(&mut normal, &mut right, figure.height_slopes(side, lowest).into_iter(), -lowest.z, weight);
         (figure, normal, right, seen)
+    }
+
+    /// The top of the head, and how far the crown of the changes is above it, pixels.
+    fn crown(&self, figure: &Figure, crown_px: f64) -> Option<(Sample, f64)> {
+        let head = &figure.posed.cylinders[Part::Head as usize];
+        let world = head.centre() + head.world_from_cylinder.matrix3.z_axis * head.half_length;
+        let point_px = self.camera.project(world)?;
+        let sample = Sample {
+            part: Part::Head,
+            point_px,
+            normal: DVec2::NEG_Y,
+            is_outer: true,
+            world,
+            radius: DVec3::ZERO,
+            z: 1.0,
+            taper: 0.0,
+        };
+        Some((sample, point_px.y - crown_px))
     }
 
     /// Priors of people, of the stated height and of smooth motion.
@@ -443,10 +473,21 @@ impl<'a> Problem<'a> {
             missed_inside: seen.inner_missed / seen.inner.max(1.0),
             worst_length_sd: lengths.fold(0.0, f64::max),
             sole_m: self.is_scale_seen.then(|| self.mean_sole_m(&fitted.unknowns)),
+            crown_off: self.crown_off(&fitted.unknowns),
         }
     }
 
     /// Mean height of the lower sole above the ground.
+    /// How far the crown of the changes is above the model's, in the median of the frames, as a share of the height.
+    fn crown_off(&self, unknowns: &Unknowns) -> Option<f64> {
+        let off = |k: usize| {
+            let figure = self.figure(unknowns, k);
+            let (_, off_px) = self.crown(&figure, self.frames[k].view.crown_px?)?;
+            Some(off_px / self.camera.pixel_height_at(figure.pelvis.with_z(0.0), figure.body.height_m)?)
+        };
+        median(&mut (0..self.frames.len()).filter_map(off).collect::<Vec<_>>())
+    }
+
     fn mean_sole_m(&self, unknowns: &Unknowns) -> f64 {
         let soles: f64 = (0..self.frames.len()).map(|k| self.figure(unknowns, k).lowest_point().1.z).sum();
         soles / self.frames.len() as f64
@@ -626,6 +667,9 @@ fn robust(distance: f64) -> [f64; 2] {
     [1.0 - near, near * near]
 }
 
+/// The changes may end so far from the crown, and the standard deviation of what is beyond, shares of the person's height.
+const CROWN_FREE: f64 = 0.012;
+const CROWN_SD: f64 = 0.01;
 /// A step of this many grey levels counts half as much as a large one.
 const CLEAR_STEP: f64 = 15.0;
 /// Standard deviation of the height of a standing foot, metres, and the number of independent feet in a walk.
@@ -700,10 +744,8 @@ fn add_scaled(into: &mut [f64], from: &[f64], by: f64) {
 mod tests {
     use super::*;
     use crate::image::Image;
-    use crate::model::body::Part;
     use crate::synth::scene::{SceneOptions, SynthScene, Truth};
     use crate::track::search::tests::{camera, walker};
-    use glam::DVec3;
 
     #[test]
     fn a_short_walk_and_an_empty_picture_are_no_person() {
@@ -717,6 +759,7 @@ mod tests {
                 grey: grey.clone(),
                 background: Some(grey.clone()),
                 others: Vec::new(),
+                crown_px: None,
             },
             visible: 1.0,
             start: Hypothesis { along_m: 0.05 * k as f64, height_m: 0.9, phase: 0.04 * k as f64 },
@@ -762,6 +805,7 @@ mod tests {
                     grey: scene.frame(truth.frame),
                     background: Some(background.clone()),
                     others: Vec::new(),
+                    crown_px: None,
                 },
                 visible: 1.0,
                 start: Hypothesis { height_m, ..truth.hypothesis },
@@ -789,6 +833,34 @@ mod tests {
         };
         let [at, one, two] = [0.0, 1.0, 2.0].map(&mut said);
         assert!(one < 0.6 * at && two < 0.3 * at, "{at} {one} {two}");
+    }
+
+    /// Changes that end farther from the head than hair makes of it draw the head there.
+    #[test]
+    fn the_crown_of_the_changes_draws_the_head_to_it() {
+        let Drawn { camera, walker, route, mut frames } = drawn();
+        let options = FitOptions::default();
+        let mut said = |off: Option<f64>| {
+            let at = |frames: &[FitFrame], crown_px: f64| {
+                let problem = Problem::new(&camera, &walker, &route, frames, &options);
+                let mut unknowns = problem.start(0.0);
+                unknowns.whole.fill(0.0);
+                let width = problem.last_start_width(&unknowns).unwrap();
+                let (figure, _, right, _) = problem.figure_terms(&unknowns, 10, &width, &mut Room::default());
+                let (top, _) = problem.crown(&figure, crown_px).unwrap();
+                (right[unknowns::HEIGHT], top.point_px.y, width.height_px)
+            };
+            frames[10].view.crown_px = None;
+            let (_, row, height_px) = at(&frames, 0.0);
+            frames[10].view.crown_px = off.map(|off| row - off * height_px);
+            at(&frames, 0.0).0
+        };
+        let alone = said(None);
+        for off in [-0.01, 0.0, 0.01] {
+            assert_eq!(said(Some(off)), alone, "{off}");
+        }
+        let [below, above, farther] = [-0.05, 0.05, 0.1].map(|off| said(Some(off)) - alone);
+        assert!(below < 0.0 && above > 0.0 && farther > 2.0 * above, "{below} {above} {farther}");
     }
 
     /// A place that no contour shows is where the places before and after say.

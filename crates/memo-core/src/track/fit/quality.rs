@@ -1,6 +1,8 @@
 //! How well the model fits the person.
 
-use super::super::decisions::{MOST_SOLE_M, POORLY_MISSED, POORLY_OFF, WELL_LENGTH_SD, WELL_MISSED};
+use super::super::decisions::{
+    MOST_SOLE_M, POORLY_CROWN, POORLY_MISSED, POORLY_OFF, WELL_LENGTH_SD, WELL_MISSED,
+};
 /// How well the contours of the fitted person lie on the edges of the frames.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct FitQuality {
@@ -16,6 +18,9 @@ pub struct FitQuality {
     pub worst_length_sd: f64,
     /// Mean height of the lower sole above the ground, metres; `None` in an assumed camera, whose ground is assumed.
     pub sole_m: Option<f64>,
+    /// How far the moving region reaches above the head of the model, in the median of the frames, as a share of the
+    /// person's height in the image; `None` if no frame shows the person alone.
+    pub crown_off: Option<f64>,
 }
 
 /// A verdict on the fit.
@@ -45,13 +50,22 @@ impl FitQuality {
     /// The verdict.
     #[must_use]
     pub fn verdict(&self) -> FitVerdict {
-        if self.missed >= POORLY_MISSED || self.residual_px >= POORLY_OFF * self.height_px {
+        if self.missed >= POORLY_MISSED
+            || self.residual_px >= POORLY_OFF * self.height_px
+            || self.is_beside_the_crown()
+        {
             FitVerdict::Poorly
         } else if self.missed < WELL_MISSED && self.worst_length_sd < WELL_LENGTH_SD {
             FitVerdict::Well
         } else {
             FitVerdict::InPart
         }
+    }
+
+    /// True if the head of the model is not where the person's is.
+    #[must_use]
+    pub fn is_beside_the_crown(&self) -> bool {
+        self.crown_off.is_some_and(|off| off.abs() >= POORLY_CROWN)
     }
 
     /// True if the feet do not stand on the ground of a calibrated camera.
@@ -72,6 +86,7 @@ mod tests {
         missed_inside: 0.05,
         worst_length_sd: 1.0,
         sole_m: Some(0.01),
+        crown_off: Some(0.004),
     };
 
     #[test]
@@ -82,6 +97,10 @@ mod tests {
         assert_eq!(verdict(FitQuality { worst_length_sd: 3.1, ..GOOD }), "in part");
         assert_eq!(verdict(FitQuality { missed: 0.11, ..GOOD }), "poorly");
         assert_eq!(verdict(FitQuality { residual_px: 1.5, ..GOOD }), "poorly");
+        for off in [0.04, -0.04] {
+            assert_eq!(verdict(FitQuality { crown_off: Some(off), ..GOOD }), "poorly");
+        }
+        assert_eq!(verdict(FitQuality { crown_off: None, ..GOOD }), "well");
     }
 
     #[test]

@@ -6,6 +6,7 @@
 use super::edge_search::View;
 use crate::image::{Image, Rectangle};
 use crate::model::EllipticCylinder;
+use crate::track::locate::Sighting;
 use rayon::prelude::*;
 
 /// The empty scene is the median of half this many frames to this many.
@@ -42,6 +43,8 @@ pub struct Piece {
     pub grey: Image<u8>,
     /// The bodies of other people near it.
     pub others: Vec<EllipticCylinder>,
+    /// Row of the crown by the changes, pixels; `None` where they do not show the person alone.
+    pub crown_px: Option<f64>,
 }
 
 impl Piece {
@@ -54,13 +57,24 @@ impl Piece {
             right: (window.right + margin).min(image.width() - 1),
             bottom: (window.bottom + margin).min(image.height() - 1),
         };
-        Self { frame, window, kept, grey: cut(image, &kept), others }
+        Self { frame, window, kept, grey: cut(image, &kept), others, crown_px: None }
+    }
+
+    /// The same with the row of the crown.
+    pub fn with_crown(self, sighting: Option<&Sighting>) -> Self {
+        Self { crown_px: sighting.map(Sighting::crown_px), ..self }
     }
 
     /// The piece before an empty scene that is as large as the frames.
     pub fn before(self, empty: &Image<u8>) -> View {
         let background = Some(cut(empty, &self.kept));
-        View { corner: [self.kept.left, self.kept.top], grey: self.grey, background, others: self.others }
+        View {
+            corner: [self.kept.left, self.kept.top],
+            grey: self.grey,
+            background,
+            others: self.others,
+            crown_px: self.crown_px,
+        }
     }
 }
 
@@ -102,20 +116,21 @@ impl Backdrop {
     }
 
     /// The same of somebody who never leaves a place: the empty scene is that of the frames without the person, and
-    /// unknown if there are none.
+    /// unknown if there are none. The head hardly moves, so changes do not show the crown.
     pub fn views_on_the_spot<'a>(&self, pieces: impl Iterator<Item = &'a Piece>) -> Vec<View> {
-        let pieces: Vec<&Piece> = pieces.collect();
+        let pieces: Vec<Piece> = pieces.map(|piece| Piece { crown_px: None, ..piece.clone() }).collect();
         let is_walk = |frame: usize| pieces.iter().any(|piece| piece.frame == frame);
         if self.frames.iter().any(|kept| !is_walk(kept.frame)) {
-            return self.views_before(pieces.into_iter(), 1);
+            return self.views_before(pieces.iter(), 1);
         }
         let alone = |p: &Piece| View {
             corner: [p.kept.left, p.kept.top],
             grey: p.grey.clone(),
             background: None,
             others: p.others.clone(),
+            crown_px: p.crown_px,
         };
-        pieces.into_iter().map(alone).collect()
+        pieces.iter().map(alone).collect()
     }
 
     fn views_before<'a>(&self, pieces: impl Iterator<Item = &'a Piece>, least: usize) -> Vec<View> {
@@ -135,6 +150,7 @@ impl Backdrop {
                 grey: piece.grey.clone(),
                 background: Some(background),
                 others: piece.others.clone(),
+                crown_px: piece.crown_px,
             }
         };
         pieces.into_iter().map(behind).collect()
@@ -178,6 +194,14 @@ mod tests {
 
     fn window(k: usize) -> Rectangle {
         Rectangle { left: 10 + 3 * k, top: 10, right: 29 + 3 * k, bottom: 49 }
+    }
+
+    #[test]
+    fn a_view_has_the_crown_of_its_sighting() {
+        let sighting = Sighting { time_s: 0.0, rectangle: window(3) };
+        let piece = Piece::new(3, &frame(3), window(3), Vec::new());
+        assert_eq!(piece.clone().with_crown(None).before(&frame(0)).crown_px, None);
+        assert_eq!(piece.with_crown(Some(&sighting)).before(&frame(0)).crown_px, Some(12.0));
     }
 
     #[test]

@@ -22,7 +22,8 @@ impl Tracker {
         let Some(window) = standing.window(sighting.as_ref().map(|s| &s.rectangle)) else { return Ok(()) };
         let window = grown(&window, evidence, WINDOW_MARGIN_PX);
         let edges = self.edges(evidence, &window, self.options.camera.as_ref())?;
-        let piece = |_| Piece::new(evidence.frame, &evidence.grey, window, Vec::new());
+        let crown = sighting.as_ref();
+        let piece = |_| Piece::new(evidence.frame, &evidence.grey, window, Vec::new()).with_crown(crown);
         let feet = sighting.and_then(|sighting| feet(&sighting, evidence, &self.options));
         self.standing = standing.with(sighting, feet, edges, self.options.fit.map(piece));
         Ok(())
