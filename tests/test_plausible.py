@@ -14,6 +14,7 @@ from memo.plausible import (
     contradiction_sentences,
     implausible_sentences,
     measured_height_sentences,
+    running_sentences,
 )
 from memo.tracking import fit_sentence
 from memo.video import VideoReader
@@ -159,3 +160,17 @@ def test_a_head_below_the_person_s_is_named():
     angles = {name: np.array([1.0]) for name in TRACK_COLUMNS if name.endswith("_deg")}
     said = fit_sentence(types.SimpleNamespace(fit=fit, columns=angles))
     assert "its head 15% of the height below the person's" in said
+@pytest.mark.parametrize(
+    ("speed_mps", "runs"), [(1.3, False), (2.0, False), (2.2, True), (float("nan"), False)]
+)
+def test_somebody_who_is_too_fast_to_walk_runs(speed_mps, runs):
+    said = running_sentences(walk(), speed_mps)
+    assert len(said) == runs and all(
+        sentence.startswith("This is not walking: at 2.20 m/s") for sentence in said
+    )
+
+
+def test_a_walk_that_is_played_too_fast_is_not_called_walking(scene):
+    track = tracked(scene, times_s=scene.times_s / 2.2, camera=scene.camera)
+    assert any("not walking" in said for said in track.sentences), track.sentences
+    assert any("not walking" in doubt for doubt in track.summary["doubts"])

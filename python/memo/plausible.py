@@ -15,11 +15,18 @@ __all__ = [
     "contradiction_sentences",
     "implausible_sentences",
     "measured_height_sentences",
+    "running_sentences",
     "tilt_sentences",
 ]
 
 #: A camera whose roll is known worse than this is not known to be level, degrees.
 _UNKNOWN_ROLL_DEG = 2.0
+#: People begin to run at this squared speed over gravity and length of the leg (Kram, Domingo and Ferris,
+#: J Exp Biol 200:821, 1997). Drawn walks of six people reach 0.25.
+_RUNNING_FROUDE = 0.5
+#: Length of the leg as a share of the height (Drillis and Contini 1966).
+_LEG = 0.53
+_GRAVITY_MPS2 = 9.81
 
 
 def assumed_height_sentences(walk: Walk, *, camera_given: bool = False) -> list[str]:
@@ -96,3 +103,13 @@ def implausible_sentences(walk: Walk) -> list[str]:
         where = "above" if walk.fit.sole_m > 0 else "below"
         said.append(f"The feet are {100 * abs(walk.fit.sole_m):.0f} cm {where} the ground: check the camera.")
     return said
+
+
+def running_sentences(walk: Walk, speed_mps: float) -> list[str]:
+    """Says that somebody is too fast to walk: the model of a walker fits runners as well."""
+    if not speed_mps**2 > _RUNNING_FROUDE * _GRAVITY_MPS2 * _LEG * walk.height.height_m:
+        return []
+    return [
+        f"This is not walking: at {speed_mps:.2f} m/s people of this height run. Use no angle, event or gait "
+        "parameter of it. If the person walks, check the frame rate."
+    ]

@@ -23,6 +23,7 @@ from memo.plausible import (
     contradiction_sentences,
     implausible_sentences,
     measured_height_sentences,
+    running_sentences,
     tilt_sentences,
 )
 from memo.table import data_frame
@@ -406,6 +407,7 @@ class Track:
             told += tilt_sentences(walk.camera_tilt) if index == 0 else []
             unseen = cadence_sentences(self.gait_parameters, index)
             told += unseen
+            told += running_sentences(walk, self._pace(walk)[0])
             told += implausible_sentences(walk)
             if walk.p_swapped > LIKELY_SWAPPED:
                 chance = f"probability {walk.p_swapped:.0%}"
@@ -517,7 +519,11 @@ class Track:
             "height_source": main.height.source,
             "measured_height_m": main.measured_height.height_m if main.measured_height else None,
             "measured_height_sd_m": main.measured_height.sd_m if main.measured_height else None,
-            "doubts": [*contradiction_sentences(main), *implausible_sentences(main)],
+            "doubts": [
+                *contradiction_sentences(main),
+                *running_sentences(main, speed),
+                *implausible_sentences(main),
+            ],
             "fit": _fit(main),
             "camera_motion": self.camera_motion.summary,
         }
