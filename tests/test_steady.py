@@ -1,6 +1,7 @@
 """A camera in the hand: its rotation against OpenCV's, and walks shaken and still."""
 
 import csv
+from types import SimpleNamespace
 
 import cv2
 import memo
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 from conftest import SHARED_DATA
 from memo import _memo
+from memo.camera_motion import CameraMotion
 
 SIZE = (320, 240)
 
@@ -59,6 +61,39 @@ def test_a_cut_ends_in_a_sentence():
     assert any("frame 6 (a cut)" in sentence for sentence in track.sentences)
     given = memo.track(frames, height_m=1.75, fps=25, camera=camera, steady=False)
     assert given.camera_motion.rows == [] and given.camera_motion.sentences == []
+
+
+def test_a_slow_zoom_is_reported():
+    camera, wall = _memo.Camera.level(SIZE, 50.0, 1.0, 5.0), textured(1)
+    first = shot(wall, camera, [0, 0, 0])
+    frames = []
+    for k in range(60):
+        zoom = cv2.getRotationMatrix2D((159.5, 119.5), 0, 1 + 0.006 * k)
+        frames.append(cv2.warpAffine(first, zoom, SIZE, flags=cv2.INTER_CUBIC, borderMode=cv2.BORDER_REFLECT))
+    track = memo.track(frames, height_m=1.75, fps=25, camera=camera)
+    assert track.camera_motion.moved or track.camera_motion.is_unexplained
+    said = [sentence for sentence in track.sentences if "zoomed" in sentence or "another one" in sentence]
+    assert said, (track.sentences, track.camera_motion.summary)
+
+
+@pytest.mark.parametrize(
+    ("states", "is_reported"),
+    [
+        (["still"] * 20, False),
+        (["unknown"] * 20, False),  # before a plain wall nothing is known of the camera
+        (["still"] * 19 + ["unknown"], False),
+        (["still"] * 2 + ["unknown"] * 18, True),
+        (["still", "turned"] * 5 + ["unknown"] * 10, True),
+    ],
+)
+def test_frames_that_no_turn_explains_are_reported(states, is_reported):
+    rows = [
+        SimpleNamespace(frame=k, state=state, turn_rad=(0, 0, 0), shift_px=1.0, rms_px=0.5, support=0.5)
+        for k, state in enumerate(states)
+    ]
+    motion = CameraMotion(rows)
+    said = [sentence for sentence in motion.sentences if "the camera did more than turn" in sentence]
+    assert motion.is_unexplained == is_reported and len(said) == is_reported
 
 
 def test_a_hand_held_recording_is_steadied():

@@ -397,6 +397,6 @@ def write_tables(recorded: Recorded, out: Path) -> None:
     write_gait_parameters_csv(gait, recorded.gait_parameters)
     write_cycles_csv(cycles, recorded.cycles)
     recorded.written = [table, events, gait, cycles, write_run(out, recorded, *recorded.run)]
-    if recorded.camera_motion.moved:
+    if recorded.camera_motion.moved or recorded.camera_motion.is_unexplained:
         recorded.written.append(out / "camera_motion.csv")
         write_camera_motion_csv(recorded.written[-1], recorded.camera_motion)
