@@ -6,9 +6,11 @@ import memo
 import numpy as np
 import pytest
 from conftest import grey_video, ran
+from memo import _memo
 from memo.explain import explain
 from memo.files import read_track_csv
 from memo.report import write_report
+from memo.tracking import Track
 
 
 @pytest.fixture(scope="module")
@@ -59,6 +61,14 @@ def test_a_stored_walk_keeps_it(track):
 def test_without_a_calibrated_camera_nobody_is_followed_by_the_feet(scene):
     track = memo.track(list(scene.frames[:45]), fps=25, height_m=scene.height_m)
     assert not any(walk.is_frontal for walk in track.walks)
+
+
+def test_somebody_who_is_not_followed_without_a_camera_is_told_what_to_give():
+    seek = _memo.SeekReport(90, 79, 0, 17)
+    without, calibrated = Track([], seek), Track([], seek, _memo.Camera.level((640, 480), 50.0, 1.0, 5.0))
+    assert without.summary["status"] == calibrated.summary["status"] == "not walking"
+    assert "tracked only with a calibrated camera" in without.summary["message"]
+    assert "calibrated" not in calibrated.summary["message"]
 
 
 def test_frames_are_explained_and_reported(scene, tmp_path):

@@ -583,6 +583,8 @@ class Track:
                 f"Nobody was seen walking: something moves in only {counted(moving, 'frame')}, and a walk is "
                 f"found in {needed}."
             )
+        if why == "not walking" and self._camera is None:
+            return _NOT_WALKING_WITHOUT_CAMERA
         return _NOBODY[why]
 
     def to_pandas(self, table: str = "columns") -> pandas.DataFrame:
@@ -619,6 +621,10 @@ _NOBODY = {
     "not walking": "Something moves, but not like a walking person of this height seen by this camera.",
     "never fully visible": "Somebody moves, but is never fully visible for long enough to start.",
 }
+_NOT_WALKING_WITHOUT_CAMERA = (
+    "Something moves, but not like a person of this height who walks across the picture. Somebody who walks "
+    "towards the camera or away from it is tracked only with a calibrated camera."
+)
 
 
 def _measured(walk: _memo.Walk) -> dict[str, npt.NDArray[Any]]:
