@@ -6,7 +6,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from matplotlib.figure import Figure
-from memo.overlay import CONTOUR, draw_row, draw_segments, draw_text, write_overlay
+from memo.overlay import (
+    CONTOUR,
+    LEFT,
+    PEOPLE,
+    RIGHT,
+    draw_row,
+    draw_rows,
+    draw_segments,
+    draw_text,
+    write_overlay,
+)
 from memo.plot import (
     _cut_at_wraps,
     _phase_line,
@@ -74,7 +84,24 @@ def test_text_leaves_ink_and_stays_in_the_picture():
     rgb = canvas(height=20, width=30)
     draw_text(rgb, "a text that is far too long")
     draw_text(rgb, "below the picture", line=9)
+    for at in ((-5, -5), (28, 18), (-500, 3), (3, 500)):
+        draw_text(rgb, "12", at=at)
     assert rgb.max() > 150
+
+
+def test_people_have_numbers_over_their_heads_in_colours_unlike_the_sides(core):
+    for colour in PEOPLE:
+        assert all(np.abs(np.subtract(colour, side)).max() > 60 for side in (LEFT, RIGHT)), colour
+    track = core.Track([0.0, 0.0], core.Camera((640, 480)), "tracked")
+    track.columns |= {"frame": np.array([0, 0]), "person": np.array([0, 1]), "walk": np.array([0, 1])}
+    heads_u = (200.0, 500.0)
+    track.contours = lambda row: [np.array([[heads_u[row], 150.0], [heads_u[row], 400.0]])]
+    grey = np.full((480, 640), 100, np.uint8)
+    both, one = draw_rows(grey, track, [0, 1]), draw_rows(grey, track, [1])
+    for u, person, rgb in ((200, 0, both), (500, 1, both), (500, 1, one)):
+        number = rgb[125:145, u - 10 : u + 10].reshape(-1, 3).astype(int)
+        assert np.abs(number - PEOPLE[person]).max(axis=1).min() < 40, (u, person)
+    assert (one[125:145, 190:210] == 100).all()
 
 
 @pytest.fixture

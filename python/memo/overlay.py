@@ -36,8 +36,8 @@ CONTOUR: Colour = (240, 228, 66)
 RIGHT: Colour = (230, 110, 0)
 LEFT: Colour = (86, 180, 233)
 WHITE: Colour = (255, 255, 255)
-PEOPLE: tuple[Colour, ...] = (CONTOUR, (0, 158, 115), (204, 121, 167), (213, 94, 0), (0, 114, 178))
-"""Of the contours of people, in order of appearance."""
+PEOPLE: tuple[Colour, ...] = (CONTOUR, (0, 158, 115), (204, 121, 167), (245, 245, 245), (150, 100, 245))
+"""Of the contours of people, in order of appearance; none is close to those of the sides."""
 
 _CHAINS = (("shoulder", "elbow", "wrist"), ("hip", "knee", "ankle"))
 _LEGIBLE_HEIGHT_PX = 480
@@ -96,9 +96,11 @@ def draw_rows(luma: Luma, track: Any, rows: Sequence[int], *, shrink: int = 1) -
     width_px = max(1.0, rgb.shape[0] / 360)
     columns = track.columns
 
+    def placed(segments: Segments) -> Segments:
+        return of_video(of_averaged(segments, shrink), scale)
+
     def draw(segments: Segments, colour: Colour, width_px: float, opacity: float = 1.0) -> None:
-        enlarged = of_video(of_averaged(segments, shrink), scale)
-        draw_segments(rgb, enlarged, colour, width_px, opacity=opacity)
+        draw_segments(rgb, placed(segments), colour, width_px, opacity=opacity)
 
     several = bool((columns["person"] > 0).any())
     for row in rows:
@@ -109,8 +111,22 @@ def draw_rows(luma: Luma, track: Any, rows: Sequence[int], *, shrink: int = 1) -
         for side, colour in (("left", LEFT), ("right", RIGHT)):
             draw(_trail(columns, side, row), colour, width_px, opacity=0.5)
             draw(_limbs(columns, side, row), colour, 1.5 * width_px)
+    for row in rows if several else ():
+        drawn = np.concatenate([np.reshape(track.contours(row), (-1, 2, 2)), _limbs(columns, "left", row)])
+        _number(rgb, int(columns["person"][row]), placed(drawn).reshape(-1, 2))
     _legend(rgb, columns, rows, several)
     return rgb
+
+
+def _number(rgb: Rgb, person: int, points_px: Segments) -> None:
+    """The number of a person over the highest of the points, in the person's colour."""
+    points_px = points_px[np.isfinite(points_px).all(axis=1)]
+    if not len(points_px):
+        return
+    u_px, v_px = points_px[np.argmin(points_px[:, 1])]
+    height_px = _text_height_px(rgb)
+    at = (round(u_px - 0.3 * height_px), round(v_px - 2 * height_px))
+    draw_text(rgb, str(person + 1), PEOPLE[person % len(PEOPLE)], at=at)
 
 
 def _legend(rgb: Rgb, columns: Mapping[str, Any], rows: Sequence[int], several: bool) -> None:
@@ -154,13 +170,21 @@ def draw_segments(
     rgb[rows, columns] = _blended(rgb[rows, columns], coverage, colour)
 
 
-def draw_text(rgb: Rgb, text: str, colour: Colour = WHITE, *, line: int = 0) -> None:
-    """Writes a line of text into the upper left corner, on a dark background; clipped at the image's edge."""
-    height_px = max(11, rgb.shape[0] // 40)
-    ink = np.concatenate([_ink(character, height_px) for character in text], axis=1)
-    top = 4 + line * ink.shape[0]
-    ground = rgb[top : top + ink.shape[0], 4 : 4 + ink.shape[1]]
+def draw_text(
+    rgb: Rgb, text: str, colour: Colour = WHITE, *, line: int = 0, at: tuple[int, int] | None = None
+) -> None:
+    """Writes text on a dark background, clipped at the image's edge: a line of those in the upper left
+    corner, or with its upper left corner `at` a pixel."""
+    ink = np.concatenate([_ink(character, _text_height_px(rgb)) for character in text], axis=1)
+    left, top = (4, 4 + line * ink.shape[0]) if at is None else at
+    ink = ink[max(-top, 0) :, max(-left, 0) :]
+    left, top = max(left, 0), max(top, 0)
+    ground = rgb[top : top + ink.shape[0], left : left + ink.shape[1]]
     ground[:] = _blended(ground // 3, ink[: ground.shape[0], : ground.shape[1]], colour)
+
+
+def _text_height_px(rgb: Rgb) -> int:
+    return max(11, rgb.shape[0] // 40)
 
 
 def _scale(luma: Luma) -> int:
