@@ -145,7 +145,9 @@ class Tracker:
             self._core.camera_motion(), self._core.lost_views(), camera_given=self._camera is not None
         )
         found = Track(self._walks, self._core.seek_report(), self._camera, camera_motion=motion)
-        _log.info("%s", found.summary["message"])
+        if _log.isEnabledFor(logging.INFO):
+            for sentence in found.sentences:
+                _log.info("%s", sentence)
         return found
 
     def __repr__(self) -> str:
@@ -402,6 +404,7 @@ class Track:
         for index, walk in enumerate(self.walks):
             camera_given = self.camera_motion.camera_given
             told = [*assumed_height_sentences(walk, camera_given=camera_given), self._message(walk)]
+            told += self._joined(index)
             told += [sentence for sentence in [fit_sentence(walk)] if sentence is not None]
             told += measured_height_sentences(walk)
             told += tilt_sentences(walk.camera_tilt) if index == 0 else []
@@ -422,6 +425,21 @@ class Track:
                 whose = f"Person {self.people[index] + 1}: "
             said += [whose + sentence for sentence in told]
         return said
+
+    def _joined(self, index: int) -> list[str]:
+        """Says why a walk has the person of an earlier one: it begins near where that one ended."""
+        people = self.people
+        earlier = [k for k in range(index) if people[k] == people[index]]
+        if not earlier:
+            return []
+        before = max(earlier, key=lambda k: self.walks[k].columns["time_s"][-1])
+        old, new = self.walks[before].columns, self.walks[index].columns
+        apart_m = np.hypot(new["x_m"][0] - old["x_m"][-1], new["y_m"][0] - old["y_m"][-1])
+        later_s = new["time_s"][0] - old["time_s"][-1]
+        return [
+            f"This is the same person as in walk {before + 1}: it begins {later_s:.1f} s later, "
+            f"{apart_m:.1f} m from where that walk ended."
+        ]
 
     @property
     def records(self) -> list[dict[str, Any]]:
