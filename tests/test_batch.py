@@ -20,11 +20,13 @@ from pathlib import Path
 
 import pytest
 from memo import batch
+from memo.batch import tables
 from memo.batch.engine import Progress, described
 from memo.batch.folder import OutFolder
 from memo.batch.manifest import Row
 from memo.cli.batch import _line
 from memo.files import read_text_columns
+from memo.given import heights
 from memo.unfinished import is_unfinished
 
 FULL = bool(os.environ.get("MEMO_FULL"))
@@ -267,6 +269,32 @@ def test_the_child_reads_a_row_as_it_was_given(tmp_path, truth):
     assert {name: type(value) for name, value in again.items()} == {
         name: type(value) for name, value in options.items()
     }
+
+
+def test_a_row_takes_the_heights_of_several_people(tmp_path):
+    (tmp_path / "a.mp4").write_text("x")
+    (tmp_path / "m.csv").write_text('video,height_m\na.mp4,"1.80, 1.65"\n')
+    (tmp_path / "m.toml").write_text("[[video]]\nvideo = 'a.mp4'\nheight_m = [1.80, 1.65]\n")
+    (of_csv,), (of_toml,) = (batch.read_manifest(tmp_path / name).rows for name in ("m.csv", "m.toml"))
+    assert of_csv.options["height_m"] == "1.80,1.65" and not of_csv.problems and not of_toml.problems
+    assert memo_heights(of_csv) == memo_heights(of_toml) == [1.80, 1.65]
+    (tmp_path / "m.csv").write_text('video,height_m\na.mp4,"1.80,165.0"\n')
+    (bad,) = batch.read_manifest(tmp_path / "m.csv").rows
+    assert "165 looks like centimetres" in bad.problems[0]
+
+
+def memo_heights(row):
+    """The heights in the options that the child reads from a row."""
+    return heights(Row.of_arguments(row.arguments)[1]["height_m"])
+
+
+def test_each_walk_has_the_height_of_its_person(tmp_path):
+    walk = {"start_s": 0.0, "end_s": 1.0, "direction": "left to right", "gait": "forward", "p_swapped": 0.0}
+    walks = [walk | {"height_m": 1.8}, walk | {"height_m": 1.65}]
+    run = {"options": {"height_m": [1.8, 1.65]}, "camera_given": True, "walks": walks}
+    (tmp_path / "run.json").write_text(json.dumps(run))
+    given, seen = tables._run(tmp_path / "run.json")
+    assert given["height_m"] == "1.8,1.65" and [seen[k]["height_m"] for k in "01"] == ["1.800", "1.650"]
 
 
 @pytest.mark.parametrize("shrink", ["0", 2.5, True, "two", -1])

@@ -160,6 +160,8 @@ def test_a_head_below_the_person_s_is_named():
     angles = {name: np.array([1.0]) for name in TRACK_COLUMNS if name.endswith("_deg")}
     said = fit_sentence(types.SimpleNamespace(fit=fit, columns=angles))
     assert "its head 15% of the height below the person's" in said
+
+
 @pytest.mark.parametrize(
     ("speed_mps", "runs"), [(1.3, False), (2.0, False), (2.2, True), (float("nan"), False)]
 )

@@ -23,7 +23,7 @@ from memo.batch.task import DEFECT, OUT_OF_MEMORY
 from memo.exits import Exit
 from memo.extras import install
 from memo.files import plain
-from memo.given import frame_range, point_in_frame, tracker_options
+from memo.given import frame_range, heights, point_in_frame, tracker_options
 
 _READING = ("name", "unit", "size", "v_up")
 
@@ -57,11 +57,12 @@ def _track(arguments: Sequence[str]) -> Exit:
     try:
         reading = {name: options.pop(f"camera_{name}", None) for name in _READING}
         height_m, camera = options.pop("height_m", None), options.pop("camera", None)
+        tall = None if height_m is None else heights(str(height_m))
         steady, treadmill = options.pop("steady", True), options.pop("treadmill", None)
         follow = options.pop("follow", None)
         recording = Recording(
             video,
-            tracker_options(height_m, camera, reading, options.pop("fov_deg", None), steady, treadmill),
+            tracker_options(tall, camera, reading, options.pop("fov_deg", None), steady, treadmill),
             frame_range(options.pop("frames", ":")),
             page=options.pop("report", False),
             follow=None if follow is None else Point(*point_in_frame(follow)),

@@ -22,7 +22,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from memo.given import frame_range, is_url, load_camera, nothing_at, point_in_frame, tracker_options
+from memo.given import frame_range, heights, is_url, load_camera, nothing_at, point_in_frame, tracker_options
 from memo.spreadsheet import CsvRows, Error
 from memo.wording import counted
 
@@ -121,7 +121,8 @@ class Row:
                 options[name] = value
             elif word in valued:
                 name, kind = valued[word]
-                options[name] = kind(next(words))
+                text = next(words)
+                options[name] = text if kind is float and "," in text else kind(text)
             else:
                 raise ValueError(f"{word} is no option of a row")
         return Path(video), options
@@ -287,7 +288,8 @@ def _row(given: _Given, base: Path, defaults: Mapping[str, Value]) -> Row:
     for key, option in OPTIONS.items():
         if key in cells:
             try:
-                options[key] = _converted(cells[key], option.kind, base)
+                several = _several_heights(cells[key]) if key == "height_m" else None
+                options[key] = several or _converted(cells[key], option.kind, base)
             except ValueError as error:
                 problems.append(f"{given.place}: {key} {error}")
     video = cells.get("video")
@@ -303,6 +305,17 @@ def _row(given: _Given, base: Path, defaults: Mapping[str, Value]) -> Row:
     # a missing video has the path of the folder's parent; `_checked` ignores it
     path = base if video is None else _located(video, base)
     return Row(name, path, options, given.place, tuple(problems))
+
+
+def _several_heights(value: Any) -> str | None:
+    """Heights of people in order of appearance as text such as 1.80,1.65; None for anything else.
+
+    Each height has its decimal point, so 1,80 is not taken for two heights.
+    """
+    if isinstance(value, list) and len(value) > 1:
+        value = ",".join(map(str, value))
+    given = re.fullmatch(r"\s*\d+\.\d+(\s*,\s*\d+\.\d+)+\s*", str(value))
+    return None if given is None else re.sub(r"\s", "", str(value))
 
 
 def _converted(value: Any, kind: type, base: Path) -> Value:
@@ -423,7 +436,7 @@ def _check_options(row: Row) -> None:
         raise ValueError(nothing_at(options["boxes"], "file"))
     camera = options.get("camera")
     reading = {name: options.get(f"camera_{name}") for name in ("name", "unit", "size", "v_up")}
-    height = options.get("height_m")
+    height = heights(str(options["height_m"])) if "height_m" in options else None
     if camera is None or options.get("fov_deg") is not None:
         tracker_options(height, camera, reading, options.get("fov_deg"))
     else:

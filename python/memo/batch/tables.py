@@ -73,8 +73,10 @@ def _run(path: Path) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
     """Values common to all walks of a video; and times and direction of each walk, by its number."""
     try:
         run = json.loads(path.read_text(encoding="utf-8"))
+        height_m = run["options"]["height_m"]
+        several = isinstance(height_m, list)
         given = {
-            "height_m": run["options"]["height_m"],
+            "height_m": ",".join(map(str, height_m)) if several else height_m,
             "camera_given": "yes" if run["camera_given"] else "no",
         }
         seen = {
@@ -84,6 +86,7 @@ def _run(path: Path) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
                 "gait": walk["gait"],
                 "p_swapped": f"{walk['p_swapped']:.6f}",
                 "fits": _fits(walk.get("fit")),
+                **({"height_m": f"{walk['height_m']:.3f}"} if several else {}),
             }
             for number, walk in enumerate(run["walks"])
         }
