@@ -176,3 +176,12 @@ def test_a_walk_that_is_played_too_fast_is_not_called_walking(scene):
     track = tracked(scene, times_s=scene.times_s / 2.2, camera=scene.camera)
     assert any("not walking" in said for said in track.sentences), track.sentences
     assert any("not walking" in doubt for doubt in track.summary["doubts"])
+
+
+def test_without_a_camera_a_height_is_measured_against_the_first_persons():
+    measured = walk(height=_memo.BodyHeight(1.82, 0.04, "measured"))
+    (without,), (calibrated,) = (
+        measured_height_sentences(measured, camera_given=given) for given in (False, True)
+    )
+    assert "if the first person's height is right" in without and "standard deviation" not in without
+    assert "measured in the picture" in calibrated

@@ -65,9 +65,17 @@ def tilt_sentences(tilt: CameraTilt | None) -> list[str]:
     return [f"{seen} turned {way} by {abs(tilt.roll_deg):.1f}° {sd}{pitched}."]
 
 
-def measured_height_sentences(walk: Walk) -> list[str]:
-    """The measured height, where none was given, or where it contradicts the given one."""
+def measured_height_sentences(walk: Walk, *, camera_given: bool = True) -> list[str]:
+    """The measured height, where none was given, or where it contradicts the given one.
+
+    Without a given camera, the first person's height gives the scale of everybody else.
+    """
     height = walk.height
+    if height.source == "measured" and not camera_given:
+        return [
+            f"The person is {height.height_m:.2f} m tall if the first person's height is right: without a "
+            "calibrated camera, it is measured against that height and as wrong as that one."
+        ]
     if height.source == "measured":
         return [
             f"The person is {height.height_m:.2f} m tall, measured in the picture "

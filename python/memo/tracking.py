@@ -406,7 +406,7 @@ class Track:
             told = [*assumed_height_sentences(walk, camera_given=camera_given), self._message(walk)]
             told += self._joined(index)
             told += [sentence for sentence in [fit_sentence(walk)] if sentence is not None]
-            told += measured_height_sentences(walk)
+            told += measured_height_sentences(walk, camera_given=self._camera is not None)
             told += tilt_sentences(walk.camera_tilt) if index == 0 else []
             unseen = cadence_sentences(self.gait_parameters, index)
             told += unseen
