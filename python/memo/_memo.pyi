@@ -453,8 +453,8 @@ class WalkFit:
     sole_m: Final[float | None]
     """Mean height of the lower sole above the ground, metres; None in an assumed camera."""
     crown_off: Final[float | None]
-    """How far the moving region reaches above the model's head, in the median of the frames, as a share of the
-    person's height in the image; None if no frame shows the person alone."""
+    """How far the moving region reaches above the model's head, in the median of the frames, as a share of
+    the person's height in the image; None if no frame shows the person alone."""
     is_beside_the_crown: Final[bool]
     """Whether the head of the model is not where the person's is."""
     is_off_ground: Final[bool]

@@ -22,8 +22,8 @@ result! {
         worst_length_sd: f64 = fit.quality.worst_length_sd,
         /// Mean height of the lower sole above the ground, metres; None in an assumed camera.
         sole_m: Option<f64> = fit.quality.sole_m,
-        /// How far the moving region reaches above the model's head, in the median of the frames, as a share of the
-        /// person's height in the image; None if no frame shows the person alone.
+        /// How far the moving region reaches above the model's head, in the median of the frames, as a share of
+        /// the person's height in the image; None if no frame shows the person alone.
         crown_off: Option<f64> = fit.quality.crown_off,
         /// Whether the head of the model is not where the person's is.
         is_beside_the_crown: bool = fit.quality.is_beside_the_crown(),

@@ -156,7 +156,9 @@ impl Active {
         let (first, last) = (&twin.steps[0], &recent[RECENT_FRAMES - 1]);
         let covered_m = last.state.along.position - first.state.along.position;
         let mean_mps = covered_m.abs() / (last.time_s - first.time_s);
-        let speed_mps = last.state.along.velocity.abs();
+        // Who turns round on the spot is slow for a moment only.
+        let speeds_mps = recent.iter().map(|step| step.state.along.velocity.abs());
+        let speed_mps = speeds_mps.fold(f64::INFINITY, f64::min);
         let is_seen = matched(recent).is_some_and(|found| found >= LOST_SHARE * mean_similarity(twin));
         let stands = is_seen && speed_mps < STANDING_SHARE * mean_mps;
         let is_on_a_path = !self.is_on_treadmill && self.frontal.is_none();
@@ -499,6 +501,9 @@ pub(super) mod tests {
         for (share, stands) in [(0.59, true), (-0.59, true), (0.61, false), (-0.61, false), (1.0, false)] {
             assert_eq!(slowed(share).standing().is_some(), stands, "{share}");
         }
+        let mut turned_round = slowed(1.0);
+        turned_round.walk.twins[0].steps[33].state.along.velocity = 0.1;
+        assert!(turned_round.standing().is_some(), "slow for a moment");
         for (visible, similarity) in [(0.2, 0.5), (1.0, 0.1)] {
             let mut unseen = slowed(0.1);
             for step in &mut unseen.walk.twins[0].steps[28..] {

@@ -265,10 +265,12 @@ impl TrackedWalk {
         })
     }
 
-    /// Steps by side; `None` if the sides are ambiguous or the walk is backward.
+    /// Steps by side; `None` if the sides are ambiguous, the walk is backward or the fit failed.
     fn sides(&self, whole: &Whole) -> Option<Sides> {
         let is_sure = self.p_swapped() <= LIKELY_MISTAKEN && self.start.p_other_direction <= LIKELY_MISTAKEN;
-        if !is_sure || self.direction() == Direction::Backward {
+        // Without the fit that was wanted, contacts are those of the average gait, and a hidden leg looks like an uneven step.
+        let is_misfit = matches!(self.fit, Some(Err(_)));
+        if !is_sure || is_misfit || self.direction() == Direction::Backward {
             return None;
         }
         let strikes = match self.fitted() {

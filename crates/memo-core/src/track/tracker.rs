@@ -35,8 +35,8 @@ use super::fit::views::{Backdrop, Piece};
 use super::height::is_of_a_person;
 use super::locate::Sighting;
 use super::options::TrackerOptions;
-use super::people::Identities;
 pub use super::people::Now;
+use super::people::{Identities, Sign};
 use super::result::TrackedWalk;
 use super::standing::Standing;
 use super::steady::{CameraMotion, Loss};
@@ -451,7 +451,9 @@ impl Tracker {
     /// where that person was is the same person, whose first walk ends there.
     fn identified(&mut self, new: &Active) -> usize {
         let Some(start) = new.sign_at(0) else { return self.identities.count() };
-        let end = |old: &Active| old.standing().or_else(|| old.sign_before(start.time_s));
+        // The old walk may have gone on for some frames while the person turned round.
+        let stood = |end: Sign| Sign { time_s: end.time_s.min(start.time_s), ..end };
+        let end = |old: &Active| old.standing().map(stood).or_else(|| old.sign_before(start.time_s));
         let leads = |(_, old): &(f64, Active)| end(old).is_some_and(|end| end.leads_to(&start));
         let Some(n) = self.fading.iter().position(leads) else { return self.identities.appear(&start) };
         let (_, mut old) = self.fading.remove(n);
@@ -637,7 +639,9 @@ impl Tracker {
         let p_swapped = active.p_swapped(&self.options);
         let fit = active.fit(&self.backdrop, &self.options, Some(p_swapped));
         // What was left over from somebody else can look like a walker, but then the contours do not fit.
-        let is_left_over = active.started_near && matches!(fit, Some(Err(FitError::Misfit { .. })));
+        let is_short = active.steps().len() < self.options.start_frames;
+        let is_left_over =
+            active.started_near && (is_short || matches!(fit, Some(Err(FitError::Misfit { .. }))));
         if is_left_over || !active.takes_steps(fit.as_ref().and_then(|fit| fit.as_ref().ok())) {
             self.report.refused_starts += 1;
             self.identities.withdraw(active.person);

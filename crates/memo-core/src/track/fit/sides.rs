@@ -3,7 +3,7 @@
 //! With wrong sides the outline can be the same, but then the far limbs are drawn in front of the near ones: their
 //! lines inside the body, where the frames have edges, are hidden. So the right sides explain more of these lines.
 
-use super::super::decisions::{SIDES_LOG_ODDS, SIDES_LOST, SIDES_OF_TRACKER};
+use super::super::decisions::{SIDES_LOG_ODDS, SIDES_LOST, SIDES_OF_TRACKER, SIDES_OFF};
 use super::seen::Seen;
 
 /// Evidence for one choice of sides against another: logarithms of the ratios of explained inner lines and of costs,
@@ -18,10 +18,12 @@ pub fn evidence(chosen: &Seen, other: &Seen) -> f64 {
 }
 
 /// Probability of the `other` choice of sides; `p_tracked` is that by the tracker. The evidence is of ratios: of a person
-/// of whom others hid a part, the same ratios show less, in proportion to the `visible` share.
+/// of whom others hid a part, the same ratios show less, in proportion to the `visible` share, and so they do where neither
+/// fit finds the outline.
 pub fn p_other(chosen: &Seen, other: &Seen, p_tracked: f64, visible: f64) -> f64 {
     let p = p_tracked.clamp(1e-6, 1.0 - 1e-6);
-    let by_fit = SIDES_LOG_ODDS * visible * evidence(chosen, other);
+    let clear = SIDES_OFF / (SIDES_OFF + chosen.off().min(other.off()));
+    let by_fit = SIDES_LOG_ODDS * visible * clear * evidence(chosen, other);
     let log_odds = by_fit + SIDES_OF_TRACKER * ((1.0 - p) / p).ln();
     1.0 / (1.0 + log_odds.exp())
 }
@@ -52,6 +54,12 @@ mod tests {
             (log_odds(half) - 0.5 * log_odds(whole)).abs() < 1e-9,
             "half of the person shows half as much"
         );
+        // Where both fits miss as much more than usual as counts half, they show half as much.
+        let unclear = |seen: Seen| Seen { outer_missed: 500.0 * (Seen::USUALLY_MISSED + SIDES_OFF), ..seen };
+        let clear = log_odds(p_other(&seen(10.0, 5.0), &seen(15.0, 5.0), 0.5, 1.0));
+        let off = log_odds(p_other(&unclear(seen(10.0, 5.0)), &unclear(seen(15.0, 5.0)), 0.5, 1.0));
+        let one_off = log_odds(p_other(&seen(10.0, 5.0), &unclear(seen(15.0, 5.0)), 0.5, 1.0));
+        assert!((off - 0.5 * clear).abs() < 1e-9 && (one_off - clear).abs() < 1e-9);
         // Where both fits are alike, the tracker's odds of nine to one count half: three to one.
         assert!((p_other(&seen(10.0, 5.0), &seen(10.0, 5.0), 0.1, 1.0) - 0.25).abs() < 1e-12);
         assert!(p_other(&Seen::default(), &Seen::default(), 0.5, 1.0).is_finite());

@@ -1,3 +1,4 @@
+use super::super::fit::FitError;
 use super::super::result;
 use super::super::search::tests::walker;
 use super::super::search::{Axis, Hypothesis, Path};
@@ -402,6 +403,7 @@ fn sides_are_told_where_side_and_direction_are_likely() {
         assert!(line(&walk, GaitQuantity::StepTime, None).value.is_some());
         line(&walk, GaitQuantity::StepTime, Some(Side::Right)).value.is_some()
     };
+    assert!(!sided(&|walk| walk.fit = Some(Err(FitError::Undetermined))));
     assert!(sided(&|walk| walk.start.p_other_direction = 0.19));
     assert!(!sided(&|walk| walk.start.p_other_direction = 0.21));
     // p = 1 / (1 + exp(9.25 m)) for a margin m of one glimpse.
