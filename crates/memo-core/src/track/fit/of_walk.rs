@@ -52,8 +52,11 @@ impl Tracked<'_> {
             fit
         };
         if !self.is_on_treadmill {
-            let fit = problem(route).fit(p_swapped)?;
-            return Ok(with_tilt(self.with_height_of_its_own(fit, problem(route))));
+            let mut fit = problem(route).fit(p_swapped)?;
+            if p_swapped.is_some() {
+                fit = self.with_height_of_its_own(fit, problem(route));
+            }
+            return Ok(with_tilt(fit));
         }
         let mirrored = mirrored(&route.at(0.0), self.camera).into();
         let [here, there] = [route, &mirrored].map(|route| problem(route).on_treadmill());

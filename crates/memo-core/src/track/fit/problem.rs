@@ -668,6 +668,7 @@ fn robust(distance: f64) -> [f64; 2] {
 }
 
 /// The changes may end so far from the crown, and the standard deviation of what is beyond, shares of the person's height.
+/// Models that are on the person are within 0.010 of them ([`POORLY_CROWN`](super::super::decisions)).
 const CROWN_FREE: f64 = 0.012;
 const CROWN_SD: f64 = 0.01;
 /// A step of this many grey levels counts half as much as a large one.

@@ -118,19 +118,20 @@ impl Backdrop {
     /// The same of somebody who never leaves a place: the empty scene is that of the frames without the person, and
     /// unknown if there are none. The head hardly moves, so changes do not show the crown.
     pub fn views_on_the_spot<'a>(&self, pieces: impl Iterator<Item = &'a Piece>) -> Vec<View> {
-        let pieces: Vec<Piece> = pieces.map(|piece| Piece { crown_px: None, ..piece.clone() }).collect();
+        let pieces: Vec<&Piece> = pieces.collect();
         let is_walk = |frame: usize| pieces.iter().any(|piece| piece.frame == frame);
         if self.frames.iter().any(|kept| !is_walk(kept.frame)) {
-            return self.views_before(pieces.iter(), 1);
+            let views = self.views_before(pieces.into_iter(), 1);
+            return views.into_iter().map(|view| View { crown_px: None, ..view }).collect();
         }
         let alone = |p: &Piece| View {
             corner: [p.kept.left, p.kept.top],
             grey: p.grey.clone(),
             background: None,
             others: p.others.clone(),
-            crown_px: p.crown_px,
+            crown_px: None,
         };
-        pieces.iter().map(alone).collect()
+        pieces.into_iter().map(alone).collect()
     }
 
     fn views_before<'a>(&self, pieces: impl Iterator<Item = &'a Piece>, least: usize) -> Vec<View> {
@@ -200,6 +201,13 @@ mod tests {
     fn a_view_has_the_crown_of_its_sighting() {
         let sighting = Sighting { time_s: 0.0, rectangle: window(3) };
         let piece = Piece::new(3, &frame(3), window(3), Vec::new());
+        let seen = piece.clone().with_crown(Some(&sighting));
+        for frames in [0, 4] {
+            let mut backdrop = Backdrop::default();
+            (0..frames).for_each(|k| backdrop.push(k, &frame(k)));
+            assert_eq!(backdrop.views([&seen].into_iter())[0].crown_px, Some(12.0));
+            assert_eq!(backdrop.views_on_the_spot([&seen].into_iter())[0].crown_px, None);
+        }
         assert_eq!(piece.clone().with_crown(None).before(&frame(0)).crown_px, None);
         assert_eq!(piece.with_crown(Some(&sighting)).before(&frame(0)).crown_px, Some(12.0));
     }
