@@ -206,7 +206,9 @@ fn truth(scene: &ClothedScene, line: &GaitParameter) -> Option<f64> {
     let step = |side| scene.step(side);
     let ((right_m, right_s), (left_m, left_s)) = (step(Side::Right), step(Side::Left));
     let difference = |right: f64, left: f64| 200.0 * (right - left) / (right + left);
-    let stance = 50.0 * (scene.stance[0] + scene.stance[1]);
+    let of_side = |side: Side| 100.0 * scene.stance[usize::from(side == Side::Left)];
+    let both = 0.5 * (of_side(Side::Right) + of_side(Side::Left));
+    let stance = line.side.map_or(both, of_side);
     Some(match line.quantity {
         GaitQuantity::Cadence => 120.0 * scene.cycle_hz,
         GaitQuantity::Speed => scene.speed_mps,
@@ -219,7 +221,10 @@ fn truth(scene: &ClothedScene, line: &GaitParameter) -> Option<f64> {
         GaitQuantity::Stance => stance,
         GaitQuantity::Swing => 100.0 - stance,
         GaitQuantity::DoubleSupport => 2.0 * stance - 100.0,
-        GaitQuantity::SingleSupport => 200.0 - 2.0 * stance,
+        GaitQuantity::SingleSupport => match line.side {
+            Some(side) => 100.0 - of_side(side.other()),
+            None => 200.0 - 2.0 * both,
+        },
         GaitQuantity::HipRange | GaitQuantity::KneeRange | GaitQuantity::KneePeak => return None,
     })
 }

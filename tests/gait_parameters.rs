@@ -206,15 +206,24 @@ fn what_is_not_known_is_left_open() {
     let sure = walk.gait_parameters();
     assert!(line(&sure, GaitQuantity::StepLength, Some(Side::Right)).value.is_some());
     let stance = line(&sure, GaitQuantity::Stance, None);
-    assert!(
-        stance.interval.is_some_and(|[low, high]| low > 50.0 && high < 75.0) && stance.n >= 2,
-        "{stance:?}"
-    );
+    assert!(stance.value.is_some_and(|value| (50.0..75.0).contains(&value)) && stance.n >= 2, "{stance:?}");
+    // Each side has its own: both together are their mean, and one foot stands alone while the other swings.
+    let of = |quantity, side| line(&sure, quantity, Some(side)).value.unwrap();
+    let [right, left] = [Side::Right, Side::Left].map(|side| of(GaitQuantity::Stance, side));
+    let [n_right, n_left] =
+        [Side::Right, Side::Left].map(|side| line(&sure, GaitQuantity::Stance, Some(side)).n);
+    let mean = (n_right as f64 * right + n_left as f64 * left) / (n_right + n_left) as f64;
+    assert_eq!(n_right + n_left, stance.n);
+    assert!((mean - stance.value.unwrap()).abs() < 1e-9, "{right} {left} {stance:?}");
+    assert!((of(GaitQuantity::SingleSupport, Side::Right) - (100.0 - left)).abs() < 1e-9);
+    assert!((of(GaitQuantity::Swing, Side::Left) - (100.0 - left)).abs() < 1e-9);
     // 1. The sides may be interchanged.
     walk.fit.as_mut().unwrap().as_mut().unwrap().p_swapped = 0.45;
     assert!(walk.p_swapped() > 0.4);
     let unsure = walk.gait_parameters();
-    assert_eq!(line(&unsure, GaitQuantity::StepLength, Some(Side::Right)).value, None);
+    for quantity in [GaitQuantity::StepLength, GaitQuantity::Stance, GaitQuantity::SingleSupport] {
+        assert_eq!(line(&unsure, quantity, Some(Side::Right)).value, None);
+    }
     assert!(line(&unsure, GaitQuantity::StepLength, None).value.is_some());
     assert_eq!(unsure.len(), sure.len());
     // 2. Without a fit, and a handful of frames.

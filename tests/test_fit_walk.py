@@ -89,7 +89,8 @@ def test_angles_of_a_person_who_was_not_measured_are_empty(scene, empty):
     track = memo.track(list(scene.frames), fps=25, camera=scene.camera, height_m=scene.height_m)
     lost = memo.Track([memo.fit_walk(track.walks[0], [empty] * len(scene.frames))], track.seek_report)
     assert len(lost) == len(track)
-    assert all(np.isnan(lost.columns[name]).all() for name in TRACK_COLUMNS if name.endswith("_deg"))
+    for columns in (lost.columns, lost.walks[0].columns):
+        assert all(np.isnan(columns[name]).all() for name in TRACK_COLUMNS if name.endswith("_deg"))
     for kept in ("x_m", "phase", "right_knee_x_m"):  # the result of the tracker
         assert np.isfinite(lost.columns[kept]).all()
 

@@ -120,7 +120,7 @@ def test_a_ratio_outside_its_limits_is_mentioned():
 def test_the_verdict_gives_its_reason():
     angles = {name: np.ones(3) for name in TRACK_COLUMNS if name.endswith("_deg")}
     good = {"verdict": "well", "residual_px": 0.5, "height_px": 50.0, "missed": 0.01, "worst_length_sd": 1.0}
-    good |= {"is_beside_the_crown": False, "crown_off": 0.004}
+    good |= {"is_beside_the_crown": False, "crown_off": 0.004, "off_parts": []}
 
     def said(columns=angles, **values):
         return fit_sentence(walk(fit=types.SimpleNamespace(**good | values), columns=columns))
@@ -130,6 +130,12 @@ def test_the_verdict_gives_its_reason():
         "The model fits the person poorly: its outline within 0.5 px (1.0% of the person's height), 1% of it "
         "not seen. Check the overlay before use."
     )
+    off = {"off_parts": ["left shank", "left foot"], "part_missed": {"left shank": 0.34, "left foot": 0.4}}
+    off |= {"verdict": "in part", "part_residual_px": {"left shank": 1.2}}
+    assert "; worst at the left shank (34% not seen, 1.2 px off) and the left foot (40% not seen)." in said(
+        **off
+    )
+    assert "shank" not in said(**off | {"verdict": "well"}), "the table of the report has it"
     unseen = {name: np.full(3, np.nan) for name in angles}
     assert "No joint angle is known well enough" in said(unseen, verdict="poorly", missed=0.2)
 
@@ -156,6 +162,7 @@ def test_a_head_below_the_person_s_is_named():
         worst_length_sd=1.0,
         is_beside_the_crown=True,
         crown_off=0.15,
+        off_parts=[],
     )
     angles = {name: np.array([1.0]) for name in TRACK_COLUMNS if name.endswith("_deg")}
     said = fit_sentence(types.SimpleNamespace(fit=fit, columns=angles))

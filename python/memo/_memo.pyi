@@ -461,6 +461,14 @@ class WalkFit:
     """Whether the feet do not stand on the ground of a calibrated camera."""
     verdict: Final[str]
     """How well the model fits: "well", "in part" (look at the overlay) or "poorly"."""
+    part_missed: Final[dict[str, float]]
+    """Share of the outline of each part without an edge: `right shank`, `head` ...; only parts on the
+    outline."""
+    part_residual_px: Final[dict[str, float]]
+    """Mean distance of the other edges from the outline of each part, pixels."""
+    off_parts: Final[list[str]]
+    """The parts that miss more of their outline than a good fit does, or are farther from the edges; the
+    worst first."""
     lengths_m: Final[dict[str, float]]
     """Lengths of the body, metres: ankle_height, shank, thigh, torso, stature, upper_arm, forearm."""
     curves_deg: Final[npt.NDArray[np.float64]]

@@ -62,10 +62,12 @@ DEFINITIONS: dict[str, str] = {
     "when the right step is longer. Only the part of a difference that affects the timing of the steps is "
     "measured.",
     "stance": "Share of the cycle in which a foot is on the ground: from the initial contact to the toe-off "
-    "of the fitted foot, both sides together. Interval: scatter over the steps, and 15 ms of error that "
-    "contacts have in common.",
+    "of the fitted foot, of each side and of both together. Interval: scatter over the steps, errors that a "
+    "person's contacts have in common (15 ms) and toe-offs (64 ms, because shoes bend at the toes and the "
+    "model's foot does not), and by side 9 ms of that side's own.",
     "swing": "Share of the cycle in which a foot is off the ground, 100 - stance.",
-    "single_support": "Share of the cycle in which one foot alone is on the ground, 100 - double_support.",
+    "single_support": "Share of the cycle in which one foot alone is on the ground, 100 - double_support; by "
+    "side, in which that foot is, the other's swing.",
     "double_support": "Share of the cycle in which both feet are on the ground, 2 stance - 100.",
     "hip_range": "Range of the thigh's angle against the vertical over at least one cycle, degrees.",
     "knee_range": "Range of the knee's flexion over at least one cycle, degrees.",

@@ -325,16 +325,13 @@ class Track:
 
     @property
     def columns(self) -> dict[str, npt.NDArray[Any]]:
-        """One array per column of `track.csv`; one walk after another.
-
-        Of a walk whose person could not be measured, angles are NaN; `Walk.columns` keeps those of the
-        tracker, which are those of average gait.
-        """
+        """One array per column of `track.csv`; one walk after another. Of a walk whose person could not be
+        measured, angles are NaN."""
         if not self.walks:
             return {name: np.empty(0, _WHOLE_NUMBERS.get(name, float)) for name in TRACK_COLUMNS}
         people = self.people
         tables = [
-            {**_measured(walk), "walk": np.full(len(walk), k), "person": np.full(len(walk), people[k])}
+            {**walk.columns, "walk": np.full(len(walk), k), "person": np.full(len(walk), people[k])}
             for k, walk in enumerate(self.walks)
         ]
         columns = {name: np.concatenate([table[name] for table in tables]) for name in TRACK_COLUMNS}
@@ -403,9 +400,9 @@ class Track:
             return [self.summary["message"], *said]
         for index, walk in enumerate(self.walks):
             camera_given = self.camera_motion.camera_given
-            told = [*assumed_height_sentences(walk, camera_given=camera_given), self._message(walk)]
-            told += self._joined(index)
+            told = assumed_height_sentences(walk, camera_given=camera_given)
             told += [sentence for sentence in [fit_sentence(walk)] if sentence is not None]
+            told += [self._message(walk), *self._joined(index)]
             told += measured_height_sentences(walk, camera_given=self._camera is not None)
             told += tilt_sentences(walk.camera_tilt) if index == 0 else []
             unseen = cadence_sentences(self.gait_parameters, index)
@@ -645,14 +642,6 @@ _NOT_WALKING_WITHOUT_CAMERA = (
 )
 
 
-def _measured(walk: _memo.Walk) -> dict[str, npt.NDArray[Any]]:
-    """The columns of a walk, with NaN for angles of average gait where those of the person were wanted."""
-    columns = dict(walk.columns)
-    if walk.fit is None and walk.fit_problem is not None:
-        columns |= {name: np.full(len(walk), np.nan) for name in _ANGLE_COLUMNS}
-    return columns
-
-
 def _fit(walk: _memo.Walk) -> dict[str, Any]:
     """How well the model fits the person, or why it does not."""
     fit = walk.fit
@@ -663,6 +652,11 @@ def _fit(walk: _memo.Walk) -> dict[str, Any]:
         "fits": fit.verdict,
         "outline_off_px": fit.residual_px,
         "outline_missed_percent": 100 * fit.missed,
+        "parts": {
+            name: {"off_px": fit.part_residual_px.get(name), "missed_percent": 100 * missed}
+            for name, missed in fit.part_missed.items()
+        },
+        "off_parts": fit.off_parts,
         "worst_length_sd": fit.worst_length_sd,
         "crown_off_percent": None if fit.crown_off is None else 100 * fit.crown_off,
         "lengths_m": fit.lengths_m,
@@ -675,13 +669,28 @@ def _is_in_place(walk: _memo.Walk) -> bool:
     return walk.fit.verdict != "poorly" if walk.fit is not None else walk.fit_problem is None
 
 
+_MOST_PARTS = 3
+
+
+def _parts_in_words(fit: _memo.WalkFit) -> str:
+    """The parts of the body that are off, the worst first."""
+
+    def off(name: str) -> str:
+        off_px = fit.part_residual_px.get(name)
+        beside = "" if off_px is None else f", {off_px:.1f} px off"
+        return f"the {name} ({fit.part_missed[name]:.0%} not seen{beside})"
+
+    *first, last = map(off, fit.off_parts[:_MOST_PARTS])
+    return f"{', '.join(first)} and {last}" if first else last
+
+
 def fit_sentence(walk: _memo.Walk) -> str | None:
     """The verdict on the fit, the first thing to know of a walk; None if none was asked for."""
     fit = walk.fit
     if fit is None:
         if walk.fit_problem is None:
             return None
-        return f"Its joint angles were not measured: {walk.fit_problem}."
+        return f"The joint angles were not measured: {walk.fit_problem}."
     missed = f"{fit.missed:.0%} of it not seen"
     if fit.verdict == "well":
         return f"The model fits the person well: its outline within {fit.residual_px:.1f} px, {missed}."
@@ -692,6 +701,8 @@ def fit_sentence(walk: _memo.Walk) -> str | None:
     if fit.is_beside_the_crown and fit.crown_off is not None:
         where = "below" if fit.crown_off > 0 else "above"
         seen += f", its head {abs(fit.crown_off):.0%} of the height {where} the person's"
+    if fit.off_parts:
+        seen += f"; worst at {_parts_in_words(fit)}"
     unsure = "Check the overlay before use."
     if all(np.isnan(walk.columns[name]).all() for name in _ANGLE_COLUMNS):
         unsure = "No joint angle is known well enough to be stated. " + unsure

@@ -2,10 +2,11 @@
 
 use crate::result::result;
 use memo_core::Body;
-use memo_core::track::fit;
+use memo_core::model::Part;
+use memo_core::track::fit::{self, PartQuality};
 use numpy::{PyArray1, PyArrayDyn, PyArrayMethods};
 use pyo3::prelude::*;
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 
 result! {
     /// The measured person of a walk: how well the model fits, and the person's own body and curves.
@@ -31,8 +32,14 @@ result! {
         is_off_ground: bool = fit.quality.is_off_ground(),
         /// How well the model fits: "well", "in part" (look at the overlay) or "poorly".
         verdict: String = fit.quality.verdict().name().to_owned(),
+        /// Share of the outline of each part without an edge: `right shank`, `head` ...; only parts on the outline.
+        part_missed: BTreeMap<String, f64> = of_parts(fit, |part| Some(part.missed)),
+        /// Mean distance of the other edges from the outline of each part, pixels.
+        part_residual_px: BTreeMap<String, f64> = of_parts(fit, |part| part.residual_px),
+        /// The parts that miss more of their outline than a good fit does, or are farther from the edges; the worst first.
+        off_parts: Vec<String> = fit.quality.off_parts().into_iter().map(|part| part.name().to_owned()).collect::<Vec<_>>(),
         /// Lengths of the body, metres: ankle_height, shank, thigh, torso, stature, upper_arm, forearm.
-        lengths_m: HashMap<String, f64> = lengths_m(&fit.body),
+        lengths_m: BTreeMap<String, f64> = lengths_m(&fit.body),
         /// The person's curves at fifty equally spaced phases from initial contact, (2, 5, 50) degrees: right and
         /// left; hip, knee, ankle, shoulder, elbow. NaN where a joint was not measured.
         curves_deg: Py<PyArrayDyn<f64>> = curves_deg(py, fit)?,
@@ -40,8 +47,14 @@ result! {
     |fit| format!("outline within {:.2} px, {:.1} % missed", fit.residual_px, 100.0 * fit.missed)
 }
 
+/// A number of each part by its name, without those that have none.
+fn of_parts(fit: &fit::WalkFit, of: impl Fn(&PartQuality) -> Option<f64>) -> BTreeMap<String, f64> {
+    let known = Part::ALL.iter().zip(&fit.quality.parts);
+    known.filter_map(|(part, quality)| Some((part.name().to_owned(), of(quality.as_ref()?)?))).collect()
+}
+
 /// Lengths between the joints, metres.
-fn lengths_m(body: &Body) -> HashMap<String, f64> {
+fn lengths_m(body: &Body) -> BTreeMap<String, f64> {
     let p = &body.proportions;
     let lengths = [
         ("ankle_height", p.ankle_height),

@@ -346,7 +346,7 @@ fn columns<'py>(py: Python<'py>, walk: &TrackedWalk, rows: &[Row]) -> PyResult<B
     }
     for (index, side) in ["right", "left"].into_iter().enumerate() {
         for (joint, name) in ["hip", "knee", "ankle", "shoulder", "elbow"].into_iter().enumerate() {
-            let angle = |r: &Row| angle(r, index, joint);
+            let angle = |r: &Row| angle(walk, r, index, joint);
             set(&format!("{side}_{name}_deg"), column(&|r| angle(r)[0].to_degrees()))?;
             set(&format!("sd_{side}_{name}_deg"), column(&|r| angle(r)[1].to_degrees()))?;
         }
@@ -364,10 +364,11 @@ fn columns<'py>(py: Python<'py>, walk: &TrackedWalk, rows: &[Row]) -> PyResult<B
     Ok(dict)
 }
 
-/// A joint's angle and standard deviation, radians: the measured ones, or without a fit the model's; NaN if unknown.
-fn angle(row: &Row, side: usize, joint: usize) -> [f64; 2] {
-    if let Some(sides) = row.measured {
-        return sides[side].angles[joint].unwrap_or([f64::NAN; 2]);
+/// A joint's angle and standard deviation, radians: the measured ones, or the model's if no fit was asked for; NaN if
+/// unknown.
+fn angle(walk: &TrackedWalk, row: &Row, side: usize, joint: usize) -> [f64; 2] {
+    if walk.fit.is_some() {
+        return row.measured.and_then(|sides| sides[side].angles[joint]).unwrap_or([f64::NAN; 2]);
     }
     let angles = [row.posture.right, row.posture.left][side];
     [[angles.hip, angles.knee, f64::NAN, angles.shoulder, angles.elbow][joint], f64::NAN]

@@ -67,12 +67,17 @@ class RunFolder:
         nearest = np.argmin(np.abs(self.columns["frame"] - event["frame"]))
         return int(event.get("walk", self.columns["walk"][nearest]))
 
+    def fit(self, walk: int) -> dict[str, Any]:
+        """What `run.json` says of the fit of the person; nothing in results of older versions."""
+        walks = self.run.get("walks") or []
+        fit = walks[walk].get("fit") if 0 <= walk < len(walks) else None
+        return fit if isinstance(fit, dict) else {}
+
     def verdict(self, walk: int) -> str | None:
         """How well the model fits the person: `well`, `in part`, `poorly` or `not measured`; None in results
         of older versions."""
-        walks = self.run.get("walks") or []
-        fit = walks[walk].get("fit") if 0 <= walk < len(walks) else None
-        if not isinstance(fit, dict):
+        fit = self.fit(walk)
+        if not fit:
             return None
         return str(fit.get("fits")) if fit.get("measured") else "not measured"
 

@@ -38,6 +38,7 @@ def track_text(run: RunFolder, notes: list[str], pictures: list[Picture]) -> dic
         ),
         "warnings": _warnings(run, notes),
         "parameters": _parameters(run),
+        "fits": _fits(run),
         "walks": _walks(run),
         "events": _events(run),
         "band_source": text(normative.SOURCE),
@@ -227,6 +228,39 @@ def _of_walk(run: RunFolder, walk: int, lines: list[dict[str, Any]]) -> str:
         rows.append((in_words, *(cells.get(side, UNKNOWN) for side in ("", "right", "left"))))
     header = ("parameter", "both", "right", "left")
     return rows_table(f"{name}: value, 95 % interval, number of steps", header, rows)
+
+
+def _fits(run: RunFolder) -> str:
+    """A table for each walk: how well the outline of each part of the model fits."""
+    tables = ""
+    for person, walks in run.people.items():
+        own = [_fit_of_walk(run, walk) for walk in walks]
+        tables += _of_person(person, _folded(own, _MOST_TABLES, "walks"))
+    return tables
+
+
+def _fit_of_walk(run: RunFolder, walk: int) -> str:
+    fit, name = run.fit(walk), f"Walk {walk + 1}"
+    if not fit.get("measured"):
+        return f"<p>{name}: {text(fit.get('problem') or 'the person was not measured')}.</p>"
+    caption = f"{name}: the model fits {text(fit['fits'])}"
+    parts = fit.get("parts")
+    if not parts:  # of an older version
+        return f"<p>{caption}.</p>"
+    off = set(fit["off_parts"])
+    rows = [
+        (
+            f"<b>{text(part)}</b>" if part in off else text(part),
+            *_off_and_missed(of, "off_px", "missed_percent"),
+        )
+        for part, of in parts.items()
+    ]
+    rows.append(("whole outline", *_off_and_missed(fit, "outline_off_px", "outline_missed_percent")))
+    return rows_table(caption, ("part", "off, px", "no edge, %"), rows)
+
+
+def _off_and_missed(of: Mapping[str, Any], *keys: str) -> list[str]:
+    return [UNKNOWN if of[key] is None else number(of[key], 1) for key in keys]
 
 
 def digits_of(unit: str) -> int:

@@ -72,6 +72,27 @@ impl Part {
         Self::LeftFoot,
     ];
 
+    /// The name in files and sentences, such as `right shank`.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Head => "head",
+            Self::Torso => "torso",
+            Self::RightUpperArm => "right upper arm",
+            Self::RightForearm => "right forearm",
+            Self::RightHand => "right hand",
+            Self::LeftUpperArm => "left upper arm",
+            Self::LeftForearm => "left forearm",
+            Self::LeftHand => "left hand",
+            Self::RightThigh => "right thigh",
+            Self::RightShank => "right shank",
+            Self::RightFoot => "right foot",
+            Self::LeftThigh => "left thigh",
+            Self::LeftShank => "left shank",
+            Self::LeftFoot => "left foot",
+        }
+    }
+
     /// Whether the part belongs to an arm.
     pub fn is_arm(self) -> bool {
         (2..8).contains(&(self as u8))

@@ -40,7 +40,7 @@
 
 use super::decisions::{
     CONTACT_COMMON_SD_S, CONTACT_SD_S, CONTACT_SIDE_SD_S, POSTURE_SD, REACH_COUNTS, REACH_SD_M,
-    STRIKE_SD_CYCLES,
+    STRIKE_SD_CYCLES, TOE_OFF_COMMON_SD_S,
 };
 use super::event::EventKind;
 use super::fit::belt::Belt;
@@ -95,11 +95,11 @@ pub enum GaitQuantity {
     StepTimeSymmetry,
     /// 100 (right - left) / mean of the step lengths, per cent.
     StepLengthSymmetry,
-    /// Stance of one foot, per cent of the cycle.
+    /// Stance of a foot, per cent of the cycle; without a side, of either.
     Stance,
-    /// Swing of one foot, per cent of the cycle.
+    /// Swing of a foot, per cent of the cycle; without a side, of either.
     Swing,
-    /// Stance of one foot alone, per cent of the cycle, both feet together.
+    /// Stance of a foot alone, per cent of the cycle; without a side, the sum of both.
     SingleSupport,
     /// Stance of both feet, per cent of the cycle.
     DoubleSupport,
@@ -187,13 +187,21 @@ impl TrackedWalk {
         }
         add(StepTimeSymmetry, None, sides.and_then(|s| s.time_s.symmetry));
         add(StepLengthSymmetry, None, sides.and_then(|s| s.length_m.symmetry));
-        let stance = whole.as_ref().and_then(|whole| self.stance(whole));
+        let stance = |side: Option<Side>| whole.as_ref().and_then(|whole| self.stance(whole, side));
         let rest = |e: Estimate| Estimate { value: 100.0 - e.value, ..e };
-        let double = stance.map(|e| Estimate { value: 2.0 * e.value - 100.0, half: 2.0 * e.half, ..e });
-        add(Stance, None, stance);
-        add(Swing, None, stance.map(rest));
+        let both = stance(None);
+        let double = both.map(|e| Estimate { value: 2.0 * e.value - 100.0, half: 2.0 * e.half, ..e });
+        add(Stance, None, both);
+        add(Swing, None, both.map(rest));
         add(SingleSupport, None, double.map(rest));
         add(DoubleSupport, None, double);
+        let [right, left] = [Side::Right, Side::Left].map(|side| stance(Some(side)));
+        for (side, own, other) in [(Side::Right, right, left), (Side::Left, left, right)] {
+            add(Stance, Some(side), own);
+            add(Swing, Some(side), own.map(rest));
+            // One foot stands alone while the other swings.
+            add(SingleSupport, Some(side), other.map(rest));
+        }
         for side in [Side::Right, Side::Left] {
             add(HipRange, Some(side), self.motion(side, 0).map(|m| m.range));
             add(KneeRange, Some(side), self.motion(side, 1).map(|m| m.range));
@@ -207,9 +215,11 @@ impl TrackedWalk {
         Whole::of(self).map(|whole| whole.stride_s().value)
     }
 
-    /// Stance from the contacts of the fitted feet, both sides together: from a strike to the toe-off of that foot.
-    fn stance(&self, whole: &Whole) -> Option<Estimate> {
-        if self.direction() == Direction::Backward {
+    /// Stance from the contacts of the fitted feet: from a strike to the toe-off of that foot, of both sides together or of
+    /// one, if it is known which is which.
+    fn stance(&self, whole: &Whole, side: Option<Side>) -> Option<Estimate> {
+        let is_unsure = self.p_swapped().max(self.start.p_other_direction) > LIKELY_MISTAKEN;
+        if self.direction() == Direction::Backward || side.is_some() && is_unsure {
             return None;
         }
         let contacts = &self.fitted()?.contacts;
@@ -219,7 +229,8 @@ impl TrackedWalk {
             let next = offs.map(|c| c.time_s - strike.time_s).find(|&elapsed_s| elapsed_s > 0.0)?;
             (next < LONGEST_STEP * stride_s).then_some(next)
         };
-        let strikes = contacts.iter().filter(|c| c.kind == EventKind::HeelStrike);
+        let is_asked = |c: &&Contact| side.is_none_or(|side| side == c.side);
+        let strikes = contacts.iter().filter(|c| c.kind == EventKind::HeelStrike).filter(is_asked);
         let stances: Vec<f64> = strikes.filter_map(until_off).collect();
         let n = stances.len();
         if n == 0 {
@@ -231,7 +242,10 @@ impl TrackedWalk {
         let freedom = n as f64 - 1.0;
         let variance = (PRIOR_STEPS * prior_variance + sum_sq) / (PRIOR_STEPS + freedom);
         let scatter = student_quantile(PRIOR_STEPS + freedom) * (variance / n as f64).sqrt();
-        let half = scatter.hypot(Z * std::f64::consts::SQRT_2 * CONTACT_COMMON_SD_S);
+        // Of the difference between the sides, half is in each.
+        let of_side_s = if side.is_some() { 0.5 * CONTACT_SIDE_SD_S } else { 0.0 };
+        let common_s = CONTACT_COMMON_SD_S.hypot(TOE_OFF_COMMON_SD_S);
+        let half = scatter.hypot(Z * common_s.hypot(std::f64::consts::SQRT_2 * of_side_s));
         Some(Estimate { value: mean, half, n }.times(100.0 / stride_s))
     }
 

@@ -3,6 +3,8 @@
 use super::super::decisions::{
     MOST_SOLE_M, POORLY_CROWN, POORLY_MISSED, POORLY_OFF, WELL_LENGTH_SD, WELL_MISSED,
 };
+use crate::model::body::{PART_COUNT, Part};
+
 /// How well the contours of the fitted person lie on the edges of the frames.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct FitQuality {
@@ -21,6 +23,19 @@ pub struct FitQuality {
     /// How far the moving region reaches above the head of the model, in the median of the frames, as a share of the
     /// person's height in the image; `None` if no frame shows the person alone.
     pub crown_off: Option<f64>,
+    /// The outline of each part, in the order of [`Part::ALL`]; `None` of a part that is nowhere on the outline.
+    pub parts: [Option<PartQuality>; PART_COUNT],
+}
+
+/// How well the outline of one part lies on the edges of the frames.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PartQuality {
+    /// Share of the whole outline that is of this part.
+    pub share: f64,
+    /// Share of its outline on whose normal no edge was found.
+    pub missed: f64,
+    /// Mean distance of the other edges from its outline, pixels; `None` if no edge was found.
+    pub residual_px: Option<f64>,
 }
 
 /// A verdict on the fit.
@@ -62,6 +77,26 @@ impl FitQuality {
         }
     }
 
+    /// Where the model is off: the parts that miss as much of their outline as makes a whole fit a poor one, or are as far
+    /// from their edges and at least a pixel, and more than the outline as a whole. Those that lower the fit most come
+    /// first.
+    #[must_use]
+    pub fn off_parts(&self) -> Vec<Part> {
+        let worse = |of_part: f64, whole: f64, poor: f64| {
+            if of_part >= poor.max(whole) { of_part / poor } else { 0.0 }
+        };
+        let off = |part: &Part| {
+            let quality = self.parts[*part as usize]?;
+            let missed = worse(quality.missed, self.missed, POORLY_MISSED);
+            let residual = quality.residual_px.unwrap_or(0.0);
+            let far = worse(residual, self.residual_px, (POORLY_OFF * self.height_px).max(1.0));
+            (missed + far > 0.0).then_some((quality.share * (missed + far), *part))
+        };
+        let mut found: Vec<(f64, Part)> = Part::ALL.iter().filter_map(off).collect();
+        found.sort_by(|a, b| b.0.total_cmp(&a.0));
+        found.into_iter().map(|(_, part)| part).collect()
+    }
+
     /// True if the head of the model is not where the person's is.
     #[must_use]
     pub fn is_beside_the_crown(&self) -> bool {
@@ -87,6 +122,7 @@ mod tests {
         worst_length_sd: 1.0,
         sole_m: Some(0.01),
         crown_off: Some(0.004),
+        parts: [Some(PartQuality { share: 1.0 / 14.0, missed: 0.01, residual_px: Some(0.7) }); PART_COUNT],
     };
 
     #[test]
@@ -101,6 +137,29 @@ mod tests {
             assert_eq!(verdict(FitQuality { crown_off: Some(off), ..GOOD }), "poorly");
         }
         assert_eq!(verdict(FitQuality { crown_off: None, ..GOOD }), "well");
+    }
+
+    #[test]
+    fn the_parts_that_are_off_are_named_and_the_worst_comes_first() {
+        assert_eq!(GOOD.off_parts(), []);
+        let with = |parts: &[(Part, f64, f64, f64)]| {
+            let mut quality = GOOD;
+            for &(part, share, missed, residual_px) in parts {
+                let of_part = PartQuality { share, missed, residual_px: Some(residual_px) };
+                quality.parts[part as usize] = Some(of_part);
+            }
+            quality
+        };
+        let (shank, foot, torso) = (Part::LeftShank, Part::LeftFoot, Part::Torso);
+        // A tenth is missed of a poor fit, and of 200 pixels 0.007 are 1.4.
+        let off = with(&[(shank, 0.1, 0.3, 0.7), (foot, 0.05, 0.4, 0.7), (torso, 0.2, 0.02, 1.5)]);
+        assert_eq!(off.off_parts(), [shank, torso, foot]);
+        assert_eq!(with(&[(foot, 0.05, 0.09, 1.3)]).off_parts(), []);
+        // Of a person of whom half is not seen, a part that misses less is not what is off.
+        let hidden = FitQuality { missed: 0.5, ..off };
+        assert_eq!(hidden.off_parts(), [torso]);
+        let unseen = FitQuality { parts: [None; PART_COUNT], ..GOOD };
+        assert_eq!(unseen.off_parts(), []);
     }
 
     #[test]

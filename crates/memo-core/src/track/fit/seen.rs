@@ -2,6 +2,7 @@
 
 use super::edge_search::FoundEdge;
 use super::lines::Sample;
+use crate::model::body::PART_COUNT;
 
 /// Steps of less grey levels are noise.
 pub const LEAST_STEP: f64 = 3.0;
@@ -18,6 +19,18 @@ pub struct Seen {
     pub distance_px: f64,
     /// Robust cost of all distances.
     pub cost: f64,
+    /// The outline of each part, in the order of [`Part::ALL`](crate::model::body::Part::ALL).
+    pub parts: [Outline; PART_COUNT],
+}
+
+/// Sums over the samples of an outline.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Outline {
+    pub samples: f64,
+    /// Samples without an edge.
+    pub missed: f64,
+    /// Distances of the edges, pixels.
+    pub distance_px: f64,
 }
 
 impl Seen {
@@ -28,6 +41,10 @@ impl Seen {
             self.outer += 1.0;
             self.outer_missed += missed;
             self.distance_px += (1.0 - missed) * edge.offset_px.abs();
+            let part = &mut self.parts[sample.part as usize];
+            part.samples += 1.0;
+            part.missed += missed;
+            part.distance_px += (1.0 - missed) * edge.offset_px.abs();
         } else {
             self.inner += 1.0;
             self.inner_missed += missed;
@@ -51,5 +68,10 @@ impl Seen {
         self.inner_missed += other.inner_missed;
         self.distance_px += other.distance_px;
         self.cost += other.cost;
+        for (part, of_part) in self.parts.iter_mut().zip(&other.parts) {
+            part.samples += of_part.samples;
+            part.missed += of_part.missed;
+            part.distance_px += of_part.distance_px;
+        }
     }
 }
