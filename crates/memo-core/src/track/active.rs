@@ -363,7 +363,8 @@ impl Active {
         let average = self.walk.clone();
         self.follow_again(Walk::new(fit.walker(), fit.route.clone(), beginning), kept, options);
         let summed = |walk: &Walk| walk.twins[walk.best()].similarity_sum;
-        if summed(&self.walk) <= summed(&average) {
+        let height_m = self.average.body.height_m;
+        if summed(&self.walk) <= summed(&average) || self.walk.is_less_usual_than(&average, height_m) {
             self.walk = average;
         }
     }
@@ -379,7 +380,8 @@ impl Active {
             let straight = self.walk.clone();
             self.follow_again(Walk::new(walker.clone(), start.path, start.beginning), kept, options);
             let summed = |walk: &Walk| walk.twins[walk.best()].similarity_sum;
-            if summed(&self.walk) > (1.0 + SLANT_GAIN) * summed(&straight) {
+            let is_worse = self.walk.is_less_usual_than(&straight, self.average.body.height_m);
+            if !is_worse && summed(&self.walk) > (1.0 + SLANT_GAIN) * summed(&straight) {
                 self.start = start;
             } else {
                 self.walk = straight;
@@ -486,6 +488,23 @@ pub(super) mod tests {
         ] {
             assert_eq!(ending(40, speed_mps, rate_hz, 0.5).is_over(), is_over, "{speed_mps}, {rate_hz}");
         }
+    }
+
+    /// A phase that runs at half the rate makes steps of twice the length.
+    #[test]
+    fn a_walk_with_impossible_steps_gives_way_to_one_with_usual_ones() {
+        let walked = |speed_mps: f64, rate_hz: f64| {
+            let at = |k: usize| [speed_mps, rate_hz].map(|rate| rate * FRAME_S * k as f64);
+            active((0..40).map(|k| step(k, at(k), 0.5)).collect()).walk
+        };
+        let (usual, halved) = (walked(1.2, 0.9), walked(1.2, 0.45));
+        assert!(halved.is_less_usual_than(&usual, 1.75) && !usual.is_less_usual_than(&halved, 1.75));
+        assert!(!usual.is_less_usual_than(&walked(1.3, 1.0), 1.75));
+        // Twice too high a frame rate: neither has steps as people take them.
+        assert!(!walked(2.4, 0.9).is_less_usual_than(&walked(2.4, 1.8), 1.75));
+        assert!(!walked(1.2, 0.0).is_less_usual_than(&walked(0.0, 0.0), 1.75), "on the spot");
+        assert!(walked(1.2, 0.0).is_less_usual_than(&usual, 1.75), "the phase stands still");
+        assert!(!usual.is_less_usual_than(&active(Vec::new()).walk, 1.75));
     }
 
     /// At 0.6 of the mean speed and less; who is hidden or lost, or walks on a treadmill, does not stand.

@@ -11,6 +11,7 @@
 use super::gait_parameters::GaitQuantity;
 use super::height::POPULATION_HEIGHT_M;
 use super::result::TrackedWalk;
+use super::walk::Walk;
 
 /// Limits of the walk ratio of a person 1.70 m tall, m per step per minute. 28 drawn walks of six people at 0.9 to
 /// 1.5 m/s, among them crouched, limping and brisk ones, and a filmed one have 0.0048 to 0.0074.
@@ -37,6 +38,26 @@ impl WalkRatio {
     pub fn new(step_m: f64, steps_per_min: f64, height_m: f64) -> Self {
         let scale = (height_m / POPULATION_HEIGHT_M).powf(1.5);
         Self { value: step_m / steps_per_min, usual: USUAL.map(|limit| limit * scale) }
+    }
+}
+
+impl Walk {
+    /// The walk ratio of what was followed so far, of a person of this height, metres; `None` of a single frame.
+    pub(super) fn ratio(&self, height_m: f64) -> Option<WalkRatio> {
+        let steps = &self.twins[self.best()].steps;
+        let (first, last) = (steps.first()?, steps.last()?);
+        let elapsed_s = last.time_s - first.time_s;
+        let covered_m = (last.state.along.position - first.state.along.position).abs();
+        let cycles = (last.state.phase.position - first.state.phase.position).abs();
+        (elapsed_s > 0.0)
+            .then(|| WalkRatio::new(0.5 * covered_m / cycles, 120.0 * cycles / elapsed_s, height_m))
+    }
+
+    /// True if the other walk, of the same frames, has a walk ratio that people have, and this one has not: then its phase
+    /// went wrong. At a wrong frame rate, neither has.
+    pub(super) fn is_less_usual_than(&self, other: &Self, height_m: f64) -> bool {
+        let is_usual = |walk: &Self| walk.ratio(height_m).is_none_or(|ratio| ratio.is_usual());
+        is_usual(other) && !is_usual(self)
     }
 }
 
