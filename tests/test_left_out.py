@@ -135,7 +135,7 @@ def test_only_the_longest_are_told():
     assert left_out_sentences([], 0) == []
 
 
-@pytest.mark.parametrize("scene_name", ["three", "pair", "cross2"])
+@pytest.mark.parametrize("scene_name", ["three", "pair", "cross2", "toward"])
 def test_nobody_is_left_out_where_everybody_is_followed(scene_name, tmp_path):
     scene = SHARED_DATA / "people" / scene_name
     if not scene.is_dir():

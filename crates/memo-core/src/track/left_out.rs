@@ -272,7 +272,7 @@ impl Shots {
 #[derive(Debug, Clone)]
 pub(super) struct Trail {
     shots: Shots,
-    /// The frame in which the walk started: until then, its regions were those of a candidate.
+    /// The frame in which the walk was started, after its first ones: until then, its regions were those of a candidate.
     started: usize,
 }
 

@@ -146,6 +146,8 @@ pub struct Tracker {
     standing: Standing,
     /// What moves and is not followed.
     unfollowed: Unfollowed,
+    /// The frame in which each person who is followed was started.
+    started: BTreeMap<usize, usize>,
     /// How a camera that is not given is tilted, by the first frame with something that may be a person.
     tilt: Option<TiltEstimate>,
     /// Boxes around people that were given, by frame.
@@ -175,6 +177,7 @@ impl Tracker {
             identities: Identities::default(),
             standing: Standing::default(),
             unfollowed: Unfollowed::default(),
+            started: BTreeMap::new(),
             tilt: None,
             boxes: BTreeMap::new(),
             finished: Vec::new(),
@@ -625,6 +628,7 @@ impl Tracker {
                     self.candidates.remove(n);
                     active.person = self.identified(&active);
                     active.started_near = !self.people.is_empty();
+                    self.started.insert(active.person, evidence.frame);
                     self.people.push(active);
                 }
                 Err(reason) => {
@@ -669,7 +673,8 @@ impl Tracker {
         active.straighten(&self.options.walk);
         let standing = active.standing();
         active.trim();
-        let trail = trail(&active);
+        let started = self.started.remove(&active.person);
+        let trail = trail(&active, started.unwrap_or(usize::MAX - 1));
         if !active.is_walk() {
             self.withdraw(&active, trail, Reason::NotWalking);
             return;

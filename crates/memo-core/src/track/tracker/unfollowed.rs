@@ -30,15 +30,14 @@ pub(super) fn with_small_ones(group: &GroupOptions) -> GroupOptions {
     GroupOptions { min_area: group.min_area / 4, ..*group }
 }
 
-/// Where somebody was in the frames of a walk.
-pub(super) fn trail(active: &Active) -> Option<Trail> {
+/// Where somebody was in the frames of a walk, who is followed from frame `started` on.
+pub(super) fn trail(active: &Active, started: usize) -> Option<Trail> {
     let shot = |step: &super::super::walk::Step| {
         let hypothesis = step.state.hypothesis();
         let body = active.scene(hypothesis.along_m).pose(&hypothesis).cylinders;
         let rectangle = body_rectangle(&active.camera, &body)?;
         Some(Shot { frame: step.frame, time_s: step.time_s, rectangle })
     };
-    let started = active.start.frames.last().copied().unwrap_or(0);
     Trail::new(active.steps().iter().filter_map(shot), started)
 }
 
