@@ -671,6 +671,7 @@ def tracks(d, tracker):
     "Tracker.take_finished",
     "Tracker.people",
     "Tracker.seek_report",
+    "Tracker.left_out",
     "Tracker.camera_motion",
     "Tracker.lost_views",
 )
@@ -681,6 +682,8 @@ def _(d, name):
     all(True for _ in tracks(d, tracker))
     tracker.people(), tracker.seek_report(), tracker.camera_motion(), tracker.lost_views()
     tracker.finish()
+    for left in tracker.left_out():
+        (repr(left), left._repr_html_())
     for walk in tracker.take_finished():
         (repr(walk), walk._repr_html_(), walk.contours(0))
     tracker.finish() if d.is_wrong() else None
@@ -998,8 +1001,9 @@ def results():
     made = [
         *(WALK, WALK.start, WALK.start.line, WALK.height, WALK.gait_parameters[0], explanation(scene)),
         _memo.WalkerState(0, 3, 0.1, 0.2, 0.0, 1.0, 0.0, 0.25, 0.1, 1.3),
-        *(_memo.SeekReport(9, 3, 1, 0), motion, _memo.LostView(4, "cut")),
+        *(_memo.SeekReport(9, 3, 1, 0, 1, 2, 0.3), motion, _memo.LostView(4, "cut")),
         _memo.SteadiedFrame(motion, np.zeros((3, 4), np.uint8), np.zeros((3, 4), bool)),
+        _memo.LeftOut(3, 20, 0.12, 0.8, 15, "too slow", 0.1, [[3, 10, 20, 30, 80], [20, 11, 20, 30, 80]]),
         _memo.GaitEvent(0.1, 2.5, "toe_off", "left"),
         _memo.GaitCycle("left", "mean", float("nan"), float("nan"), cycle),
         *(_memo.Departure("left", "knee", 6.0, 2.0, 30, 0.2), _memo.WalkRatio(0.006, 0.004, 0.011)),

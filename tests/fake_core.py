@@ -65,6 +65,7 @@ class Track:
         self._given = (times_s, status)
         self.camera = camera
         self.camera_motion = CameraMotion()
+        self.left_out = []
         self.columns = walk(times_s, camera)
         self.events = [
             {"time_s": float(times_s[i]), "frame": i + 0.25, "event": "heel_strike", "side": side}

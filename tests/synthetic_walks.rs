@@ -3,6 +3,7 @@
 
 use glam::{DVec2, DVec3};
 use memo_core::synth::SceneOptions;
+use memo_core::track::left_out::Reason;
 use memo_core::track::start::Direction;
 use memo_core::track::{EventKind, GaitChoice};
 use memo_core::{Side, SynthScene, TrackError, TrackedWalk, Tracker, TrackerOptions};
@@ -222,4 +223,13 @@ fn a_sliding_box_is_not_a_walker_and_cut_off_feet_are_not_fully_visible() {
         assert!(tracker.take_finished().is_empty());
         assert!(tracker.seek_report().refused_starts > 0);
     }
+    let reasons = |tracker: &Tracker| tracker.left_out().iter().map(|left| left.reason).collect::<Vec<_>>();
+    assert_eq!(reasons(&slid), [Reason::NotWalking]);
+    let slid = slid.left_out().remove(0);
+    assert!(slid.first().frame <= 2 && slid.last().frame >= 47, "{slid:?}");
+    for shot in &slid.shots {
+        let middle = (shot.rectangle.left + shot.rectangle.right) / 2;
+        assert!(middle.abs_diff(95 + 5 * shot.frame) < 20, "{shot:?}");
+    }
+    assert_eq!(reasons(&cropped), [Reason::CutOff]);
 }

@@ -26,6 +26,7 @@ __all__ = [
     "ImageStages",
     "InternalError",
     "LastStage",
+    "LeftOut",
     "LimbSides",
     "LostView",
     "PhaseLine",
@@ -292,6 +293,7 @@ class Tracker:
     def take_finished(self) -> list[Walk]: ...
     def people(self) -> list[WalkerState]: ...
     def seek_report(self) -> SeekReport: ...
+    def left_out(self) -> list[LeftOut]: ...
     def camera_motion(self) -> list[FrameMotion]: ...
     def lost_views(self) -> list[LostView]: ...
 
@@ -331,6 +333,34 @@ class SeekReport:
     """Of these, frames in which the image border cut the region."""
     refused_starts: Final[int]
     """Refused starts: the region moved too slowly, did not fit the height, or did not walk."""
+    left_out: Final[int]
+    """People and things that moved and were not followed."""
+    frames_relit: Final[int]
+    """Frames whose brightness differed suddenly and was made that of the others."""
+    largest_flicker: Final[float]
+    """Largest such difference, as a share of the brightness."""
+
+    def __new__(cls, *fields: Any) -> Self: ...
+    def __getnewargs__(self) -> tuple[Any, ...]: ...
+    def _repr_html_(self) -> str: ...
+
+@final
+class LeftOut:
+    """Somebody or something that moved and was not followed."""
+
+    first_frame: Final[int]
+    """First frame in which it was seen, from 0."""
+    last_frame: Final[int]
+    start_s: Final[float]
+    end_s: Final[float]
+    frames: Final[int]
+    """Number of frames in which it was seen."""
+    reason: Final[str]
+    """Why it was not followed."""
+    value: Final[float | None]
+    """The figure of the reason: pixels, m/s or frames."""
+    boxes: Final[list[list[int]]]
+    """Frame, left, top, width and height of up to 16 boxes, from the first frame to the last, pixels."""
 
     def __new__(cls, *fields: Any) -> Self: ...
     def __getnewargs__(self) -> tuple[Any, ...]: ...

@@ -26,6 +26,7 @@ from memo.exits import Exit
 from memo.files import write_events_csv, write_track_csv
 from memo.gait import write_gait_parameters_csv
 from memo.given import InputError, check_writable, nothing_at
+from memo.left_out import LeftOut
 from memo.run import Source, write_run
 
 if TYPE_CHECKING:
@@ -118,11 +119,14 @@ class Recorded:
     shrink: int
     records: list[dict[str, Any]]
     camera_motion: CameraMotion
+    left_out: list[LeftOut]
     run: tuple[Mapping[str, Any], Source, int, bool]
     """Options, source, frames read and whether frames were left: the input of `write_run`."""
     written: list[Path] = field(default_factory=list)
     followed: int | None = None
     """The person chosen by a point, counted among everybody who was tracked."""
+    not_there: str | None = None
+    """If nobody was tracked at that point: who was tracked where in its frame."""
 
     @property
     def interrupted(self) -> bool:
@@ -136,8 +140,9 @@ class Recorded:
 
     @property
     def exit(self) -> Exit:
-        """The exit code that reports whether anybody was tracked."""
-        return Exit.TRACKED if len(self.columns["frame"]) else Exit.NOBODY
+        """The exit code that reports whether anybody was tracked, at the point if one was given."""
+        is_there = len(self.columns["frame"]) and self.not_there is None
+        return Exit.TRACKED if is_there else Exit.NOBODY
 
     @property
     def document(self) -> dict[str, Any]:
@@ -204,9 +209,8 @@ def _track_recording(
         tracker, point = memo.Tracker(**options), recording.follow
         boxes = None if recording.boxes is None else _boxes(recording.boxes, reader)
         recorded = follow(reader, tracker, source, out, reader.frame_count, progress, stop, point, boxes)
-        if point is not None and recorded.followed is None:
-            at = f"{point.u_px:g},{point.v_px:g}@{point.frame}"
-            remark(f"{video}: nobody was tracked at {at}: the results are those of everybody")
+        if recorded.not_there is not None:
+            remark(f"{video}: {recorded.not_there}")
         if reader.damage:
             remark(f"{video}: {reader.damage}")
     if recorded.interrupted:
@@ -356,9 +360,13 @@ def _recorded(
     followed = None
     if point is not None:
         followed = track.person_at(point.u_px, point.v_px, point.frame - first_frame)
+    not_there = None
     if followed is not None:
         track = track.of_person(followed)
+    elif point is not None:
+        not_there = _not_there(track, point, first_frame)
     track.camera_motion = replace(track.camera_motion, first_frame=first_frame)
+    track.left_out = [left.of_video(1, first_frame) for left in track.left_out]
 
     def renumbered(table: Mapping[str, Any]) -> dict[str, Any]:
         return {**table, "frame": np.asarray(table["frame"]) + first_frame} if "frame" in table else {**table}
@@ -381,8 +389,31 @@ def _recorded(
         shrink=source.shrink,
         records=track.records,
         camera_motion=track.camera_motion,
+        left_out=track.left_out,
         run=(tracker.options, source, frames_read, interrupted),
         followed=followed,
+        not_there=not_there,
+    )
+
+
+def _not_there(track: Track, point: Point, first_frame: int) -> str:
+    """Says who was tracked in the frame of a point where nobody was, and where."""
+    said = f"nobody was tracked at {point.u_px:g},{point.v_px:g}@{point.frame}"
+    if not len(track):
+        return said
+    columns, middles = track.columns, []
+    for row in np.flatnonzero(columns["frame"] == point.frame - first_frame).tolist():
+        points = track.contours(row).reshape(-1, 2)
+        points = points[np.isfinite(points).all(axis=1)]
+        if len(points):
+            u_px, v_px = (points.min(axis=0) + points.max(axis=0)) / 2
+            middles.append(f"person {columns['person'][row] + 1} at {u_px:.0f},{v_px:.0f}@{point.frame}")
+    if middles:
+        return f"{said}, but {' and '.join(middles)}: the results are those of everybody"
+    frames = [columns["frame"][columns["person"] == person] + first_frame for person in set(track.people)]
+    known = [f"person {k + 1} in frames {own.min()} to {own.max()}" for k, own in enumerate(frames)]
+    return (
+        f"{said}, nor anywhere in this frame, but {' and '.join(known)}: the results are those of everybody"
     )
 
 

@@ -108,6 +108,7 @@ def write_run(
             "summary": track.summary,
             "sentences": track.sentences,
             "walks": track.records,
+            "left_out": [left.record for left in track.left_out],
         },
     )
     return path
@@ -131,15 +132,16 @@ _KINDS: dict[str, tuple[type, ...]] = {
     "summary": (dict,),
     "sentences": (list,),
     "walks": (list,),
+    "left_out": (list,),
 }
 
 
 def read_run(folder: str | PathLike[str]) -> dict[str, Any]:
     """Reads `run.json` of a folder; checks that all keys exist and have the right type.
 
-    `schema`, `interrupted`, `shrink` and `pixels_of` may be missing, as in older folders; they are then 1,
-    `False`, 1 and "video", and the camera is converted to that of the video. A schema newer than `SCHEMA` is
-    refused.
+    `schema`, `interrupted`, `shrink`, `pixels_of` and `left_out` may be missing, as in older folders; they
+    are then 1, `False`, 1, "video" and empty, and the camera is converted to that of the video. A schema
+    newer than `SCHEMA` is refused.
     """
     path = Path(folder) / NAME
     try:
@@ -157,6 +159,7 @@ def read_run(folder: str | PathLike[str]) -> dict[str, Any]:
     run.setdefault("shrink", 1)
     of_pictures = "pixels_of" not in run
     run.setdefault("pixels_of", "video")
+    run.setdefault("left_out", [])
     for key, kinds in _KINDS.items():
         if key not in run:
             raise RunError(f"{path}: {key} is missing")
@@ -174,8 +177,9 @@ def read_run(folder: str | PathLike[str]) -> dict[str, Any]:
         raise RunError(f"{path}: shrink must be at least 1, got {run['shrink']}")
     if run["frames_read"] < 0:
         raise RunError(f"{path}: frames_read must not be negative, got {run['frames_read']}")
-    if not all(isinstance(walk, dict) for walk in run["walks"]):
-        raise RunError(f"{path}: walks must be objects")
+    for key in ("walks", "left_out"):
+        if not all(isinstance(item, dict) for item in run[key]):
+            raise RunError(f"{path}: {key} must be objects")
     if of_pictures and run["shrink"] > 1 and run["camera"] is not None:
         try:
             run["camera"] = camera_of_video(run["camera"], run["shrink"])

@@ -16,6 +16,7 @@ from memo.camera_motion import CameraMotion
 from memo.cycles import cycle_table, departure_sentences
 from memo.files import EVENT_COLUMNS, TRACK_COLUMNS
 from memo.gait import cadence_sentences, gait_table, lookup, symmetry_sentences
+from memo.left_out import LeftOut, left_out_sentences, over_ground
 from memo.notebook import table
 from memo.pixels import camera_of_video, columns_of_video, of_video
 from memo.plausible import (
@@ -144,7 +145,13 @@ class Tracker:
         motion = CameraMotion(
             self._core.camera_motion(), self._core.lost_views(), camera_given=self._camera is not None
         )
-        found = Track(self._walks, self._core.seek_report(), self._camera, camera_motion=motion)
+        found = Track(
+            self._walks,
+            self._core.seek_report(),
+            self._camera,
+            camera_motion=motion,
+            left_out=[LeftOut.of(left) for left in self._core.left_out()],
+        )
         if _log.isEnabledFor(logging.INFO):
             for sentence in found.sentences:
                 _log.info("%s", sentence)
@@ -302,6 +309,7 @@ class Track:
         shrink: int = 1,
         video_size: tuple[int, int] | None = None,
         camera_motion: CameraMotion | None = None,
+        left_out: Sequence[LeftOut] = (),
     ) -> None:
         self.walks: list[_memo.Walk] = list(walks)
         self.seek_report: _memo.SeekReport = seek_report
@@ -311,6 +319,9 @@ class Track:
         self._video_size = video_size
         self.camera_motion: CameraMotion = camera_motion or CameraMotion()
         """The camera in every frame; the world of the results is that of the first one."""
+        self.left_out: list[LeftOut] = list(left_out)
+        """Who or what moved and was not followed, in order of the first frames; at most the 100 who were seen
+        longest, of `seek_report.left_out`."""
 
     def of_video(self, shrink: int, size: tuple[int, int] | None = None) -> Track:
         """The same track in pixels of the video whose frames were averaged `shrink` by `shrink`, as
@@ -320,7 +331,13 @@ class Track:
         """
         motion = replace(self.camera_motion, shrink=shrink)
         return Track(
-            self.walks, self.seek_report, self._camera, shrink=shrink, video_size=size, camera_motion=motion
+            self.walks,
+            self.seek_report,
+            self._camera,
+            shrink=shrink,
+            video_size=size,
+            camera_motion=motion,
+            left_out=[left.of_video(shrink // self.shrink) for left in self.left_out],
         )
 
     @property
@@ -395,9 +412,10 @@ class Track:
     @property
     def sentences(self) -> list[str]:
         """The findings in sentences, one walk after another."""
-        said = self.camera_motion.sentences
+        said = self.camera_motion.sentences + self._flicker_sentences()
+        left_out = left_out_sentences(self.left_out, self.seek_report.left_out)
         if not self.walks:
-            return [self.summary["message"], *said]
+            return [self.summary["message"], *said, *left_out]
         for index, walk in enumerate(self.walks):
             camera_given = self.camera_motion.camera_given
             told = assumed_height_sentences(walk, camera_given=camera_given)
@@ -421,7 +439,16 @@ class Track:
             elif self.people[index] > 0:
                 whose = f"Person {self.people[index] + 1}: "
             said += [whose + sentence for sentence in told]
-        return said
+        return said + left_out
+
+    def _flicker_sentences(self) -> list[str]:
+        seek = self.seek_report
+        if not seek.frames_relit:
+            return []
+        return [
+            f"The brightness of the picture changes by up to {seek.largest_flicker:.0%}: "
+            f"{counted(seek.frames_relit, 'frame')} of {seek.frames} were made as bright as the others."
+        ]
 
     def _joined(self, index: int) -> list[str]:
         """Says why a walk has the person of an earlier one: it begins near where that one ended."""
@@ -513,6 +540,8 @@ class Track:
                 "message": self._nobody_message(),
                 "walks": 0,
                 "people": 0,
+                "left_out": self.seek_report.left_out,
+                "frames_relit": self.seek_report.frames_relit,
                 "camera_motion": self.camera_motion.summary,
             }
         speed, cadence = self._pace(main)
@@ -521,6 +550,8 @@ class Track:
             "message": self._message(main),
             "walks": len(self.walks),
             "people": max(self.people) + 1,
+            "left_out": self.seek_report.left_out,
+            "frames_relit": self.seek_report.frames_relit,
             "direction": self._way(main),
             "turned_deg": turned_deg(main),
             "gait": main.direction,
@@ -582,6 +613,8 @@ class Track:
 
     def _why_nobody(self) -> str:
         seek = self.seek_report
+        if over_ground(self.left_out):
+            return "not walking"
         if seek.frames_with_candidate == 0:
             return "nobody"
         if seek.refused_starts:
@@ -591,6 +624,8 @@ class Track:
         return "nobody"
 
     def _nobody_message(self) -> str:
+        if moved := over_ground(self.left_out):
+            return moved
         moving, needed = self.seek_report.frames_with_candidate, int(_memo.defaults("track")["start_frames"])
         why = self._why_nobody()
         if why == "nobody" and 0 < moving < needed:

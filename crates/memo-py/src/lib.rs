@@ -95,7 +95,7 @@ mod _memo {
     #[pymodule_export]
     use super::synth::{PyClothedScene, PyScene};
     #[pymodule_export]
-    use super::tracker::{PyTracker, SeekReport, WalkerState, population_height_m};
+    use super::tracker::{LeftOut, PyTracker, SeekReport, WalkerState, population_height_m};
     #[pymodule_export]
     use super::unswap::{LimbSides, unswap};
     #[pymodule_export]

@@ -12,6 +12,7 @@ use memo_core::image::{BackgroundOptions, FlowOptions};
 use memo_core::model::DEFAULT_HORIZONTAL_FIELD_OF_VIEW_RAD;
 use memo_core::track::fit::FitOptions;
 use memo_core::track::height::{POPULATION_HEIGHT_M, POPULATION_SD_M};
+use memo_core::track::left_out::Shot;
 use memo_core::track::score::Measure;
 use memo_core::track::steady::SteadyOptions;
 use memo_core::track::{GaitChoice, Now};
@@ -68,8 +69,40 @@ result! {
         frames_cut_off: usize,
         /// Refused starts: the region moved too slowly, did not fit the height, or did not walk.
         refused_starts: usize,
+        /// People and things that moved and were not followed.
+        left_out: usize,
+        /// Frames whose brightness differed suddenly and was made that of the others.
+        frames_relit: usize = report.light.frames,
+        /// Largest such difference, as a share of the brightness.
+        largest_flicker: f64 = report.light.largest,
     }
     |own| format!("{}, {} with a candidate", counted(own.frames, "frame"), own.frames_with_candidate)
+}
+
+result! {
+    /// Somebody or something that moved and was not followed.
+    LeftOut |_py, left: memo_core::track::left_out::LeftOut| {
+        /// First and last frame in which it was seen, from 0.
+        first_frame: usize = left.first().frame,
+        last_frame: usize = left.last().frame,
+        /// Their times, seconds.
+        start_s: f64 = left.first().time_s,
+        end_s: f64 = left.last().time_s,
+        /// Number of frames in which it was seen.
+        frames: usize,
+        /// Why it was not followed.
+        reason: String = left.reason.name(),
+        /// The figure of the reason: pixels, m/s or frames.
+        value: Option<f64> = left.reason.value(),
+        /// Frame, left, top, width and height of up to 16 boxes, from the first frame to the last, pixels.
+        boxes: Vec<[usize; 5]> = left.shots.iter().map(box_of).collect::<Vec<_>>(),
+    }
+    |own| format!("frames {} to {}: {}", own.first_frame, own.last_frame, own.reason)
+}
+
+fn box_of(shot: &Shot) -> [usize; 5] {
+    let r = &shot.rectangle;
+    [shot.frame, r.left, r.top, r.width(), r.height()]
 }
 
 /// Body heights, metres.
@@ -282,6 +315,12 @@ impl PyTracker {
     fn lost_views(&self, py: Python<'_>) -> PyResult<Vec<Py<LostView>>> {
         let losses = self.read(py, |tracker| tracker.losses().to_vec())?;
         objects(py, losses.iter().map(|loss| LostView::of(py, loss)))
+    }
+
+    /// Who or what moved and was not followed, in order of the first frames; complete after `finish`.
+    fn left_out(&self, py: Python<'_>) -> PyResult<Vec<Py<LeftOut>>> {
+        let left_out = self.read(py, |tracker| tracker.left_out())?;
+        objects(py, left_out.into_iter().map(|left| LeftOut::of(py, left)))
     }
 
     /// Counts over the whole stream; if nobody was followed, they show why.

@@ -21,7 +21,7 @@ STATUS_COLUMNS = ("name", "state", "walks", "attempt", "seconds", "message", "re
 
 _UNITS = {"1/min": "_per_min", "m": "_m", "s": "_s", "m/s": "_mps", "%": "_percent", "deg": "_deg", "": ""}
 _LEADING = (
-    *("name", "state", "walk", "person", "height_m", "camera_given"),
+    *("name", "state", "walk", "person", "height_m", "camera_given", "left_out"),
     *("start_s", "end_s", "direction", "gait", "p_swapped", "fits"),
 )
 
@@ -78,6 +78,7 @@ def _run(path: Path) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
         given = {
             "height_m": ",".join(map(str, height_m)) if several else height_m,
             "camera_given": "yes" if run["camera_given"] else "no",
+            "left_out": (run.get("summary") or {}).get("left_out", ""),
         }
         seen = {
             str(number): {

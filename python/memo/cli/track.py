@@ -21,8 +21,8 @@ EPILOG = """Examples:
   memo track slow.mp4 --height 1.68 --fps 240 --frames 100:900
 
 Exit codes: 0 a walker was tracked; 1 the input cannot be used; 2 wrong usage; \
-3 the video was read but no walker was tracked; 4 the app extra is not installed; 130 interrupted \
-(results up to then are written)."""
+3 the video was read but no walker was tracked, or none at the point of --follow; \
+4 the app extra is not installed; 130 interrupted (results up to then are written)."""
 
 
 def add_track(app: "typer.Typer") -> None:

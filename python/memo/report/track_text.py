@@ -41,6 +41,7 @@ def track_text(run: RunFolder, notes: list[str], pictures: list[Picture]) -> dic
         "fits": _fits(run),
         "walks": _walks(run),
         "events": _events(run),
+        "left_out": _left_out(run),
         "band_source": text(normative.SOURCE),
         "no_cycles": text(none_sentence(run.cycles)),
         "how": _how(run),
@@ -188,6 +189,34 @@ def _walks(run: RunFolder) -> str:
         )
     header = ("walk", "person", "frames", "time, s", "X, m", "median speed, m/s", "P(left and right swapped)")
     return rows_table("Walks in this video (the files count them from 0)", header, rows)
+
+
+def _left_out(run: RunFolder) -> str:
+    """The panel with those who moved and were not followed; empty if there are none, or in older results."""
+    left_out = run.run.get("left_out") or []
+    if not left_out:
+        return ""
+    rows = []
+    for left in left_out:
+        boxes = left.get("boxes") or [[0, 0, 0, 0, 0]]
+        frame, *box = boxes[len(boxes) // 2]
+        rows.append(
+            (
+                f"{int(left['first_frame'])} to {int(left['last_frame'])}",
+                str(int(left["frames"])),
+                f"{number(left['start_s'])} to {number(left['end_s'])}",
+                f"{', '.join(str(int(value)) for value in box)} in frame {int(frame)}",
+                text(left["sentence"]),
+            )
+        )
+    header = ("frames", "seen in", "time, s", "left, top, width, height, px", "why it was not followed")
+    table = rows_table("Those who moved and were not followed", header, rows)
+    count = (run.run.get("summary") or {}).get("left_out", len(rows))
+    more = f"<p>The {len(rows)} of {count} who were seen longest.</p>" if count > len(rows) else ""
+    return (
+        '<section class="panel" aria-labelledby="left-title"><h2 id="left-title">Not followed</h2>'
+        f"{more}{table}</section>"
+    )
 
 
 def _parameters(run: RunFolder) -> str:

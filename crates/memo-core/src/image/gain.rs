@@ -40,7 +40,7 @@ impl Gain {
         image
     }
 
-    fn map(&self, grey: f64) -> f64 {
+    pub(super) fn map(&self, grey: f64) -> f64 {
         self.scale * grey + self.offset
     }
 }
@@ -73,7 +73,7 @@ pub fn estimate_gain(a: &Frame, b: &Frame) -> Result<Gain, FrameError> {
 }
 
 /// Unclipped grey values (a, b) on a grid of about 4096 pixels.
-fn sampled_pairs(a: &Frame, b: &Frame) -> Vec<(f64, f64)> {
+pub(super) fn sampled_pairs(a: &Frame, b: &Frame) -> Vec<(f64, f64)> {
     let step = ((a.width() * a.height()) as f64 / 4096.0).sqrt().max(1.0) as usize;
     let usable = |grey: u8| (CLIPPED..=255 - CLIPPED).contains(&grey);
     let mut pairs = Vec::with_capacity(8192);
@@ -87,7 +87,7 @@ fn sampled_pairs(a: &Frame, b: &Frame) -> Vec<(f64, f64)> {
 }
 
 /// The line through the quartiles of both grey-value distributions.
-fn quartile_gain(pairs: &[(f64, f64)]) -> Gain {
+pub(super) fn quartile_gain(pairs: &[(f64, f64)]) -> Gain {
     let mut of_a: Vec<f64> = pairs.iter().map(|pair| pair.0).collect();
     let mut of_b: Vec<f64> = pairs.iter().map(|pair| pair.1).collect();
     let [a1, a2, a3] = quartiles(&mut of_a);

@@ -10,6 +10,7 @@ mod fit;
 pub(crate) mod flow;
 pub(crate) mod frame;
 pub(crate) mod gain;
+pub(crate) mod light;
 pub(crate) mod line;
 pub(crate) mod outline;
 pub(crate) mod region;
@@ -27,6 +28,7 @@ pub use edge::{EdgeChains, EdgeDomain, EdgeError, EdgeOptions, Edgel, Window, ed
 pub use flow::{FlowComponent, FlowError, FlowEvidence, FlowField, FlowOptions, velocity_field};
 pub use frame::FrameError;
 pub use gain::{Gain, estimate_gain};
+pub use light::{LightReport, SteadyLight};
 pub use line::{EdgeSegment, LineError, LineOptions, edge_segments, segments_from_chains};
 pub use outline::{Outline, outlines};
 pub use region::{GroupOptions, Rectangle, Region, Sides, group_regions, regions};

@@ -6,6 +6,7 @@ use super::decisions::{
 };
 use super::fit::views::Piece;
 use super::height::{BodyHeight, GIVEN_SD_M};
+use super::left_out::Reason;
 use super::locate::{Course, Crown, LocateError, Sighting, camera_from_sightings, locate};
 use super::options::TrackerOptions;
 use super::options::start_height;
@@ -81,25 +82,29 @@ impl Candidate {
         self.seen.drain(..(options.start_frames / 3).min(self.seen.len()));
     }
 
-    /// Starts a walk; `None` for things that do not move like a walker.
+    /// Starts a walk, or says why not: things that do not move like a walker.
     ///
     /// 1. Camera and course from the rectangles.
     /// 2. Lines of phase over the whole cycle, of several gaits; of those that look like walking the most similar one
     ///    starts ([`Self::started`]).
     /// 3. Both twins followed through the start frames.
-    pub fn begin(&self, given: &Given<'_>) -> Option<Active> {
+    pub fn begin(&self, given: &Given<'_>) -> Result<Active, Reason> {
         let options = given.options;
         let sightings: Vec<Sighting> = self.seen.iter().map(|seen| seen.sighting).collect();
-        if feet_cut_off(&sightings, given.size[1] as usize) || options.treadmill == Some(true) {
-            return None;
+        if feet_cut_off(&sightings, given.size[1] as usize) {
+            return Err(Reason::CutOff);
         }
         let height = start_height(options, given.height_m, given.camera, &sightings);
+        if options.treadmill == Some(true) {
+            let Entered { course, .. } = Entered::new(&sightings, given, &height, &GaitStyle::default())?;
+            return Err(Reason::OverGround { speed_mps: course.speed_mps });
+        }
         let Started { camera, course, walker, start } = self.started(&sightings, given, &height)?;
         let mut walk = Walk::new(walker.clone(), start.path, start.beginning);
         for seen in &self.seen {
             walk.follow(&seen.edges, &camera, &options.walk);
         }
-        Some(Active {
+        Ok(Active {
             person: 0,
             started_near: false,
             camera,
@@ -119,21 +124,26 @@ impl Candidate {
         })
     }
 
-    /// The gait with which a walk starts; `None` for things that do not move like a walker.
+    /// The gait with which a walk starts, or why none does.
     ///
     /// 1. A glance at every third frame, with every gait.
     /// 2. All frames with the gaits that may be of somebody who walks, and with the average one if there is any.
     /// 3. Of those that look like walking the most similar one, if it is clearly more similar than the average one.
-    fn started(&self, sightings: &[Sighting], given: &Given<'_>, height: &BodyHeight) -> Option<Started> {
+    fn started(
+        &self,
+        sightings: &[Sighting],
+        given: &Given<'_>,
+        height: &BodyHeight,
+    ) -> Result<Started, Reason> {
         let options = given.options;
         let entered = |style: &GaitStyle| Entered::new(sightings, given, height, style);
         let average = entered(&GaitStyle::default())?;
         let gaits = if options.fit.is_some() { &OTHER_GAITS[..] } else { &[] };
-        let others: Vec<Entered> = gaits.iter().filter_map(entered).collect();
+        let others: Vec<Entered> = gaits.iter().filter_map(|style| entered(style).ok()).collect();
 
         let edges: Vec<&FrameEdges> = self.seen.iter().map(|seen| &seen.edges).collect();
         let mut of_average = average.search(&edges, options);
-        let first = of_average.glance(GLANCE_EVERY)?;
+        let first = of_average.glance(GLANCE_EVERY).ok_or(Reason::NotWalking)?;
         let promising = |entered: Entered| {
             let mut search = entered.search(&edges, options);
             let glance = search.glance(GLANCE_EVERY)?;
@@ -144,10 +154,10 @@ impl Candidate {
         };
         let others: Vec<(Entered, StartReport)> = others.into_iter().filter_map(promising).collect();
         if first.contrast < GLANCE_CONTRAST && others.is_empty() {
-            return None;
+            return Err(Reason::NotWalking);
         }
 
-        let start = of_average.finish()?;
+        let start = of_average.finish().ok_or(Reason::NotWalking)?;
         let average = Started::new(average, start);
         let similarity = |started: &Started| started.start.lines.best.similarity;
         let other = others
@@ -156,7 +166,7 @@ impl Candidate {
             .filter(Started::walks)
             .filter(|other| similarity(other) > OTHER_GAIT_GAIN * similarity(&average))
             .max_by(|a, b| similarity(a).total_cmp(&similarity(b)));
-        other.or_else(|| average.walks().then_some(average))
+        other.or_else(|| average.walks().then_some(average)).ok_or(Reason::NotWalking)
     }
 }
 
@@ -168,23 +178,28 @@ struct Entered {
 }
 
 impl Entered {
-    /// `None` for what is no course of a person, or slower or faster than people walk.
+    /// What is no course of a person, or slower or faster than people walk, is refused.
     fn new(
         sightings: &[Sighting],
         given: &Given<'_>,
         height: &BodyHeight,
         style: &GaitStyle,
-    ) -> Option<Self> {
+    ) -> Result<Self, Reason> {
         let styled = |speed_mps: f64| {
-            Some(Walker { style: *style, ..given.options.walker(height.height_m, speed_mps).ok()? })
+            let walker = given.options.walker(height.height_m, speed_mps).map_err(|_| Reason::WrongSize)?;
+            Ok::<_, Reason>(Walker { style: *style, ..walker })
         };
         let crown_m = styled(COMFORTABLE_MPS)?.level_crown_height_m();
-        let (camera, course) = course(sightings, given, crown_m, height).ok()?;
-        if !(SLOWEST_MPS..FASTEST_MPS).contains(&course.speed_mps) {
-            return None;
+        let (camera, course) = course(sightings, given, crown_m, height)?;
+        let speed_mps = course.speed_mps;
+        if speed_mps < SLOWEST_MPS {
+            return Err(Reason::TooSlow { speed_mps });
         }
-        let walker = styled(course.speed_mps)?;
-        Some(Self { camera, course, walker })
+        if speed_mps >= FASTEST_MPS {
+            return Err(Reason::TooFast { speed_mps });
+        }
+        let walker = styled(speed_mps)?;
+        Ok(Self { camera, course, walker })
     }
 
     fn search<'a>(&'a self, edges: &'a [&FrameEdges], options: &'a TrackerOptions) -> StartSearch<'a> {
@@ -243,7 +258,7 @@ pub(super) fn feet_cut_off(sightings: &[Sighting], height: usize) -> bool {
 }
 
 /// True if two rectangles of neighbouring frames can enclose the same person.
-fn same_person(a: &Rectangle, b: &Rectangle) -> bool {
+pub(super) fn same_person(a: &Rectangle, b: &Rectangle) -> bool {
     let ratio = a.height() as f64 / b.height() as f64;
     a.gap(b) == [0, 0] && (0.6..1.6).contains(&ratio)
 }
@@ -335,7 +350,7 @@ mod tests {
         };
         let camera = options.camera.as_ref();
         let given = Given { options: &options, camera, tilt: None, height_m: Some(1.75), size: [640, 480] };
-        Candidate { seen, missed: 0 }.begin(&given)
+        Candidate { seen, missed: 0 }.begin(&given).ok()
     }
 
     /// A phone held upright sees the same as one held level, turned.

@@ -2,7 +2,8 @@
 //!
 //! Change detection compares a frame with the one before and the one after, so evidence comes one frame late. Two
 //! frames are kept, whatever the length of the stream. With a [`Steadier`], frames of a moving camera are first turned
-//! into the camera of the first frame; what a frame does not show there is no evidence.
+//! into the camera of the first frame; what a frame does not show there is no evidence. If the light flickers, frames have
+//! the brightness before ([`SteadyLight`]).
 
 use super::score::EdgeLine;
 use super::steady::{CameraMotion, Loss, Steadied, Steadier};
@@ -14,7 +15,8 @@ use crate::image::flow::{FlowField, FlowOptions, velocity_field};
 use crate::image::line::{EdgeSegment, LineError, LineOptions, segments_from_chains};
 use crate::image::{
     Background, BackgroundOptions, ChangeDetector, ChangeOptions, CleanOptions, Frame, FrameError,
-    GroupOptions, Image, Mask, Rectangle, Region, clean, dilate, fill_holes, group_regions, regions,
+    GroupOptions, Image, LightReport, Mask, Rectangle, Region, SteadyLight, clean, dilate, fill_holes,
+    group_regions, regions,
 };
 use crate::model::Camera;
 use glam::DVec2;
@@ -219,6 +221,7 @@ pub struct EvidenceStream {
     background: Option<Background>,
     frames: usize,
     steadier: Option<Steadier>,
+    light: SteadyLight,
     /// What the last three frames do not show, the latest last.
     unseen: [Option<Mask>; 3],
 }
@@ -233,6 +236,7 @@ impl EvidenceStream {
             background: None,
             frames: 0,
             steadier: None,
+            light: SteadyLight::default(),
             unseen: [const { None }; 3],
         }
     }
@@ -241,6 +245,11 @@ impl EvidenceStream {
     #[must_use]
     pub fn steadied_by(self, steadier: Option<Steadier>) -> Self {
         Self { steadier, ..self }
+    }
+
+    /// What was found of the light.
+    pub fn light(&self) -> LightReport {
+        self.light.report()
     }
 
     /// Number of frames so far.
@@ -296,6 +305,9 @@ impl EvidenceStream {
 
     fn push_next(&mut self, frame: &Frame<'_>, time_s: f64) -> Result<Option<Evidence>, EvidenceError> {
         let number = self.frames;
+        let lit = self.light.push(frame, self.options.change.min_threshold)?;
+        let lit = lit.as_ref().map(|lit| lit.as_frame());
+        let frame = lit.as_ref().unwrap_or(frame);
         let Some(steadier) = &mut self.steadier else {
             return self.push_steady(number, frame, time_s);
         };
@@ -319,6 +331,7 @@ impl EvidenceStream {
     /// Forgets the frames of a view that has ended.
     fn begin_view(&mut self) {
         self.detectors = detectors(&self.options);
+        self.light.begin_view();
         self.waiting = None;
         self.background = None;
         self.unseen = [const { None }; 3];

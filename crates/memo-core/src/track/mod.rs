@@ -15,6 +15,7 @@ pub mod fit;
 mod frontal;
 pub(crate) mod gait_parameters;
 pub mod height;
+pub mod left_out;
 pub mod locate;
 pub mod normal_gait;
 pub(crate) mod options;

@@ -17,22 +17,25 @@
 //! Memory does not grow with the length of the stream. The tracker keeps two frames, of each person the rows of the current
 //! walk and its edges (without a fit, those of the latest frames, some more than `path_frames`) and, for the fit, 32 frames of the stream (64 for a walk on a treadmill) and the part of each frame of the walk that shows the
 //! person. A walk longer than [`FitOptions::longest`](super::fit::FitOptions::longest) frames, or [`LONGEST_WALK`]
-//! without a fit, is returned in pieces of that length.
+//! without a fit, is returned in pieces of that length. Who moves and is not followed is noted in bounded memory too
+//! ([`left_out`](super::left_out)).
 //!
 //! Edges are matched within a few pixels, whatever the image size. Shrink images whose longer side exceeds about
 //! 1280 pixels first, and their camera with [`Camera::shrunk`]: a 720p walk enlarged to 1080p was tracked as
 //! well, but enlarged to 1440p it was taken for backward walking.
 
 mod on_the_spot;
+mod unfollowed;
 
 use super::active::Active;
 use super::candidate::{Candidate, Given, MISSED_FRAMES, Seen};
 use super::crowd::{Expected, body_box, clear_explained, expected, keep_own, keep_unowned};
 use super::decisions::{OUTSIDE_SHARE, SAME_PLACE_M};
-use super::evidence::{Evidence, EvidenceError, EvidenceStream};
+use super::evidence::{Evidence, EvidenceError, EvidenceOptions, EvidenceStream};
 use super::fit::FitError;
 use super::fit::views::{Backdrop, Piece};
 use super::height::is_of_a_person;
+use super::left_out::{Hindrance, LeftOut, Reason, Unfollowed};
 use super::locate::Sighting;
 use super::options::TrackerOptions;
 pub use super::people::Now;
@@ -43,12 +46,13 @@ use super::steady::{CameraMotion, Loss};
 use super::walk::FrameEdges;
 use crate::OptionError;
 use crate::calibrate::{TiltError, TiltEstimate};
-use crate::image::{Frame, GroupOptions, Mask, Rectangle, Sides, group_regions, regions};
+use crate::image::{Frame, GroupOptions, LightReport, Mask, Rectangle, Sides, group_regions, regions};
 use crate::model::body::BodyError;
 use crate::model::{Body, Camera, EllipticCylinder};
 use glam::DVec2;
 use std::collections::BTreeMap;
 use thiserror::Error;
+use unfollowed::{Moving, trail, with_small_ones};
 
 /// Why tracking stopped with an error.
 #[derive(Debug, Clone, PartialEq, Error)]
@@ -110,7 +114,7 @@ const OWN_BOX: f64 = 0.3;
 const WINDOW_MARGIN_PX: f64 = 16.0;
 
 /// Counts over the whole stream, walks included. If nobody was followed, they show why.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct SeekReport {
     /// Frames seen.
     pub frames: usize,
@@ -120,6 +124,10 @@ pub struct SeekReport {
     pub frames_cut_off: usize,
     /// Refused starts: the region moved too slowly, did not fit the height, or did not walk.
     pub refused_starts: usize,
+    /// People and things that moved and were not followed ([`Tracker::left_out`]).
+    pub left_out: usize,
+    /// The light: frames whose brightness differed suddenly and was made that of the others.
+    pub light: LightReport,
 }
 
 /// A tracker for one stream of frames.
@@ -136,6 +144,10 @@ pub struct Tracker {
     identities: Identities,
     /// Frames of something that may walk on the spot.
     standing: Standing,
+    /// What moves and is not followed.
+    unfollowed: Unfollowed,
+    /// The frame in which each person who is followed was started.
+    started: BTreeMap<usize, usize>,
     /// How a camera that is not given is tilted, by the first frame with something that may be a person.
     tilt: Option<TiltEstimate>,
     /// Boxes around people that were given, by frame.
@@ -164,6 +176,8 @@ impl Tracker {
             fading: Vec::new(),
             identities: Identities::default(),
             standing: Standing::default(),
+            unfollowed: Unfollowed::default(),
+            started: BTreeMap::new(),
             tilt: None,
             boxes: BTreeMap::new(),
             finished: Vec::new(),
@@ -219,6 +233,7 @@ impl Tracker {
             self.advance(&evidence)?;
         }
         self.take_everybody().into_iter().for_each(|active| self.end_walk(active));
+        self.unfollowed.finish(self.options.start_frames);
         Ok(())
     }
 
@@ -257,7 +272,13 @@ impl Tracker {
 
     /// Counts of candidates and refused starts so far.
     pub fn seek_report(&self) -> SeekReport {
-        self.report
+        SeekReport { left_out: self.unfollowed.count(), light: self.stream.light(), ..self.report }
+    }
+
+    /// Who or what moved and was not followed, with the reason, in order of the first frames. The list is complete after
+    /// [`Tracker::finish`]; before, it has those who are gone. Of a long stream it has the 100 who were seen longest.
+    pub fn left_out(&self) -> Vec<LeftOut> {
+        self.unfollowed.left_out()
     }
 
     /// What was found of the camera in the latest frames.
@@ -278,6 +299,7 @@ impl Tracker {
                 self.end_walk(active);
             }
         }
+        self.unfollowed.finish(self.options.start_frames);
         self.candidates.clear();
         self.standing = Standing::default();
         self.tilt = None;
@@ -306,15 +328,18 @@ impl Tracker {
         let expected = self.expect(evidence);
         let given = self.given_boxes(evidence);
         let are_given = given.is_some();
-        let regions = given.unwrap_or_else(|| {
-            evidence.candidates(&self.options.evidence).into_iter().map(|region| region.rectangle).collect()
+        let moving = given.map(Moving::of_size).unwrap_or_else(|| {
+            let group = with_small_ones(&self.options.evidence.group);
+            let options = EvidenceOptions { group, ..self.options.evidence };
+            Moving::new(evidence.candidates(&options), &self.options.evidence.group)
         });
+        let regions = &moving.regions;
         if self.options.camera.is_none() && self.tilt.is_none() && !regions.is_empty() {
             self.tilt = Some(evidence.tilt(self.options.field_of_view_rad)?);
         }
-        self.follow(evidence, &expected, &regions)?;
+        self.follow(evidence, &expected, regions)?;
         self.end_walks(evidence);
-        self.seek(evidence, regions, are_given)
+        self.seek(evidence, moving, are_given)
     }
 
     /// The boxes given for a frame, the largest first; `None` if none were given.
@@ -465,29 +490,37 @@ impl Tracker {
     }
 
     /// Adds the regions that nobody explains to the candidates, and starts those that walk.
-    fn seek(
-        &mut self,
-        evidence: &Evidence,
-        regions: Vec<Rectangle>,
-        are_given: bool,
-    ) -> Result<(), TrackError> {
+    fn seek(&mut self, evidence: &Evidence, moving: Moving, are_given: bool) -> Result<(), TrackError> {
+        let regions = &moving.regions;
         self.report.frames_with_candidate += usize::from(!regions.is_empty());
         let is_cut_off = regions.first().is_some_and(|region| whole(region, evidence).is_none());
         self.report.frames_cut_off += usize::from(is_cut_off);
         if self.people.is_empty() {
             self.stand(evidence, regions.first().and_then(|region| whole(region, evidence)))?;
         }
-        let regions = match are_given {
-            _ if self.people.is_empty() => regions,
-            true => self.unclaimed(regions),
+        let moving = match are_given {
+            _ if self.people.is_empty() => moving,
+            true => Moving::of_size(self.unclaimed(moving.regions)),
             false => self.unexplained(evidence),
         };
         self.candidates.iter_mut().for_each(|candidate| candidate.missed += 1);
         let camera = if self.people.is_empty() { None } else { self.camera() };
         let can_be = |sighting: &Sighting| camera.is_none_or(|camera| is_of_a_person(camera, sighting));
-        let whole = regions.iter().filter_map(|region| whole(region, evidence));
         let most = if are_given { usize::MAX } else { MOST_CANDIDATES };
-        let sightings: Vec<Sighting> = whole.filter(can_be).take(most).collect();
+        let mut sightings: Vec<Sighting> = Vec::new();
+        let mut hinder = |region: &Rectangle| {
+            let Some(sighting) = whole(region, evidence) else { return Some(Hindrance::CutOff) };
+            if !can_be(&sighting) {
+                return Some(Hindrance::WrongSize);
+            }
+            if sightings.len() == most {
+                return Some(Hindrance::Crowded);
+            }
+            sightings.push(sighting);
+            None
+        };
+        let hindrances: Vec<Option<Hindrance>> = moving.regions.iter().map(&mut hinder).collect();
+        self.notice(evidence, &moving, &hindrances);
         for sighting in sightings {
             let seen = self.seen(evidence, sighting)?;
             let rectangle = &sighting.rectangle;
@@ -501,6 +534,7 @@ impl Tracker {
         self.candidates.retain(|candidate| candidate.missed <= MISSED_FRAMES);
         self.start(evidence);
         self.start_on_the_spot(evidence);
+        self.settle_unfollowed();
         Ok(())
     }
 
@@ -523,7 +557,7 @@ impl Tracker {
     }
 
     /// Regions of change that the bodies of the people do not explain.
-    fn unexplained(&self, evidence: &Evidence) -> Vec<Rectangle> {
+    fn unexplained(&self, evidence: &Evidence) -> Moving {
         let mut mask: Mask = evidence.firm_mask.clone();
         for active in &self.people {
             if let Some(seen) = active.as_followed() {
@@ -531,8 +565,8 @@ impl Tracker {
             }
         }
         let group: &GroupOptions = &self.options.evidence.group;
-        let regions = group_regions(&regions(&mask, group.min_part_area), group);
-        regions.into_iter().map(|region| region.rectangle).collect()
+        let parts = regions(&mask, group.min_part_area);
+        Moving::new(group_regions(&parts, &with_small_ones(group)), group)
     }
 
     /// What a candidate shows in a frame, without the edges of people who are followed.
@@ -583,16 +617,24 @@ impl Tracker {
             let height_m = self.options.height_of(self.identities.count());
             let (options, camera, tilt) = (&self.options, self.camera(), self.tilt);
             let given = Given { options, camera, tilt, height_m, size };
-            let begun = candidate.begin(&given).filter(|active| self.is_somebody_else(active));
-            match begun.filter(|active| !self.is_left_over(active)) {
-                Some(mut active) => {
+            let begun = candidate.begin(&given);
+            let is_new = |active: &Active| self.is_somebody_else(active);
+            let begun =
+                begun.and_then(|active| if is_new(&active) { Ok(active) } else { Err(Reason::Beside) });
+            let begun = begun
+                .and_then(|active| if self.is_left_over(&active) { Err(Reason::Beside) } else { Ok(active) });
+            match begun {
+                Ok(mut active) => {
                     self.candidates.remove(n);
                     active.person = self.identified(&active);
                     active.started_near = !self.people.is_empty();
+                    self.started.insert(active.person, evidence.frame);
                     self.people.push(active);
                 }
-                None => {
+                Err(reason) => {
                     self.report.refused_starts += 1;
+                    let last = self.candidates[n].seen.last().map(|seen| seen.sighting.rectangle);
+                    last.iter().for_each(|r| self.unfollowed.refuse(evidence.frame, r, reason));
                     self.candidates[n].refuse(&self.options);
                 }
             }
@@ -631,9 +673,10 @@ impl Tracker {
         active.straighten(&self.options.walk);
         let standing = active.standing();
         active.trim();
+        let started = self.started.remove(&active.person);
+        let trail = trail(&active, started.unwrap_or(usize::MAX - 1));
         if !active.is_walk() {
-            self.report.refused_starts += 1;
-            self.identities.withdraw(active.person);
+            self.withdraw(&active, trail, Reason::NotWalking);
             return;
         }
         let p_swapped = active.p_swapped(&self.options);
@@ -643,10 +686,13 @@ impl Tracker {
         let is_left_over =
             active.started_near && (is_short || matches!(fit, Some(Err(FitError::Misfit { .. }))));
         if is_left_over || !active.takes_steps(fit.as_ref().and_then(|fit| fit.as_ref().ok())) {
-            self.report.refused_starts += 1;
-            self.identities.withdraw(active.person);
+            let is_brief = is_left_over && is_short;
+            let frames = active.steps().len();
+            let reason = if is_brief { Reason::TooBrief { frames } } else { Reason::NotWalking };
+            self.withdraw(&active, trail, reason);
             return;
         }
+        trail.into_iter().for_each(|trail| self.unfollowed.followed(trail));
         if let Some(sign) = standing.or_else(|| active.sign()) {
             self.identities.end(active.person, sign);
         }

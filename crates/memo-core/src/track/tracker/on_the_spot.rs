@@ -44,6 +44,7 @@ impl Tracker {
             Ok(mut active) => {
                 self.candidates.clear();
                 active.person = self.identified(&active);
+                self.started.insert(active.person, evidence.frame);
                 self.people.push(active);
             }
             Err(standing) if standing.lasts_s() < LONGEST_S => self.standing = standing,
