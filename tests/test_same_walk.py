@@ -1,6 +1,6 @@
 """The same walk in other pictures: mirrored, compressed, noisy, of other contrast.
 
-The clip shows dark clothes before a dark wall (`conftest.SHARED_DATA`), so every change of the pictures counts.
+The clip shows dark clothes before a dark wall (`conftest.SHARED_DATA`): every change of the pictures counts.
 """
 
 import io

@@ -298,7 +298,11 @@ impl Active {
             true => self.early.as_ref().unwrap_or(backdrop).views_on_the_spot(pieces),
             false => backdrop.views(pieces),
         };
-        Some(self.tracked(options).fit(views, fit, p_swapped))
+        let on_scale = |fit: WalkFit| {
+            let height = fit.height.map(|height| height.on_scale(self.height.scale_sd));
+            WalkFit { height, ..fit }
+        };
+        Some(self.tracked(options).fit(views, fit, p_swapped).map(on_scale))
     }
 
     /// Row of the crown in each frame by the changes, pixels.
@@ -372,7 +376,8 @@ impl Active {
     /// Starts again on an oblique path if the sightings show one and the contours fit it better.
     fn turn_path(&mut self, kept: &Kept, options: &TrackerOptions) {
         let sightings: Vec<Sighting> = kept.iter().filter_map(|(sighting, _)| *sighting).collect();
-        let crown = Crown { height_m: self.walk.walker.level_crown_height_m(), sd_m: self.height.sd_m };
+        let crown =
+            Crown { height_m: self.walk.walker.level_crown_height_m(), sd_m: self.height.sd_in_camera_m() };
         let Some(course) = locate_slanting(&sightings, &self.camera, &crown) else { return };
         let frames: Vec<&FrameEdges> = kept.iter().map(|(_, e)| e).take(options.start_frames).collect();
         let walker = &self.walk.walker;

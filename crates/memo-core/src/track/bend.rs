@@ -105,7 +105,8 @@ impl Active {
             .iter()
             .map(|step| Anchor { time_s: step.time_s, place_m: route.place(step.state.along.position) })
             .collect();
-        let crown = Crown { height_m: self.walk.walker.level_crown_height_m(), sd_m: self.height.sd_m };
+        let crown =
+            Crown { height_m: self.walk.walker.level_crown_height_m(), sd_m: self.height.sd_in_camera_m() };
         let points = curve(&anchors, &sightings, &self.camera, &crown);
         let Some(curved) = route.continued(&points, along_m) else { return false };
         // 2. A quick look whether it can be better.

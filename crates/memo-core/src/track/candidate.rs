@@ -49,6 +49,8 @@ pub(super) struct Given<'a> {
     pub camera: Option<&'a Camera>,
     /// How a camera that is not given is tilted.
     pub tilt: Option<TiltEstimate>,
+    /// Relative standard deviation of the camera's scale, if it is that of somebody who is followed.
+    pub scale_sd: f64,
     /// The given height.
     pub height_m: Option<f64>,
     /// Width and height of the frames.
@@ -94,7 +96,7 @@ impl Candidate {
         if feet_cut_off(&sightings, given.size[1] as usize) {
             return Err(Reason::CutOff);
         }
-        let height = start_height(options, given.height_m, given.camera, &sightings);
+        let height = start_height(options, given.height_m, given.camera, &sightings).on_scale(given.scale_sd);
         if options.treadmill == Some(true) {
             let Entered { course, .. } = Entered::new(&sightings, given, &height, &GaitStyle::default())?;
             return Err(Reason::OverGround { speed_mps: course.speed_mps });
@@ -248,8 +250,10 @@ pub(super) fn course(
         let depth_sd_m = course.depth_sd_m.hypot(height.assumed_scale_sd() * distance_m);
         return Ok((camera, Course { depth_sd_m, ..course }));
     };
-    let course = locate(sightings, camera, &Crown { height_m: crown_m, sd_m: height.sd_m })?;
-    Ok((camera.clone(), course))
+    let course = locate(sightings, camera, &Crown { height_m: crown_m, sd_m: height.sd_in_camera_m() })?;
+    let distance_m = course.path.distance(camera.position().truncate());
+    let depth_sd_m = course.depth_sd_m.hypot(height.assumed_scale_sd() * distance_m);
+    Ok((camera.clone(), Course { depth_sd_m, ..course }))
 }
 
 /// True if the rectangle touches the lower border in most frames. A reflection touches it only now and then.
@@ -349,7 +353,14 @@ mod tests {
             ..TrackerOptions::for_height(1.75)
         };
         let camera = options.camera.as_ref();
-        let given = Given { options: &options, camera, tilt: None, height_m: Some(1.75), size: [640, 480] };
+        let given = Given {
+            options: &options,
+            camera,
+            tilt: None,
+            scale_sd: 0.0,
+            height_m: Some(1.75),
+            size: [640, 480],
+        };
         Candidate { seen, missed: 0 }.begin(&given).ok()
     }
 
@@ -361,7 +372,14 @@ mod tests {
             .collect();
         let focal_px = |size: [u32; 2], field_of_view_rad: Option<f64>| {
             let options = TrackerOptions { field_of_view_rad, ..TrackerOptions::default() };
-            let given = Given { options: &options, camera: None, tilt: None, height_m: Some(1.75), size };
+            let given = Given {
+                options: &options,
+                camera: None,
+                tilt: None,
+                scale_sd: 0.0,
+                height_m: Some(1.75),
+                size,
+            };
             course(&sightings, &given, 1.75, &BodyHeight::given(1.75)).unwrap().0.focal_px.x
         };
         assert!((focal_px([640, 480], None) - focal_px([480, 640], None)).abs() < 1e-9);

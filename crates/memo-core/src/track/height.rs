@@ -60,22 +60,59 @@ pub struct BodyHeight {
     pub sd_m: f64,
     /// Where it comes from.
     pub source: HeightSource,
+    /// Relative standard deviation of the scale of the camera, if that is assumed from the height of another person; else
+    /// 0. That of a measured height contains it.
+    pub scale_sd: f64,
 }
 
 impl BodyHeight {
     /// The height of the population.
-    pub const POPULATION: Self =
-        Self { height_m: POPULATION_HEIGHT_M, sd_m: POPULATION_SD_M, source: HeightSource::Assumed };
+    pub const POPULATION: Self = Self {
+        height_m: POPULATION_HEIGHT_M,
+        sd_m: POPULATION_SD_M,
+        source: HeightSource::Assumed,
+        scale_sd: 0.0,
+    };
 
     /// A given height.
     #[must_use]
     pub fn given(height_m: f64) -> Self {
-        Self { height_m, sd_m: GIVEN_SD_M, source: HeightSource::Given }
+        Self { height_m, sd_m: GIVEN_SD_M, source: HeightSource::Given, scale_sd: 0.0 }
     }
 
-    /// Relative standard deviation of all lengths of a walk if this height sets its scale: 0 unless it is assumed.
+    /// The same height in a camera whose scale has this relative standard deviation: a measured one is as wrong.
+    pub(super) fn on_scale(self, scale_sd: f64) -> Self {
+        let sd_m = match self.source {
+            HeightSource::Measured => self.sd_m.hypot(scale_sd * self.height_m),
+            _ => self.sd_m,
+        };
+        Self { sd_m, scale_sd, ..self }
+    }
+
+    /// Relative standard deviation that all lengths of a walk have in common: that of an assumed height, or that of the
+    /// camera in which it was measured. A given height is the scale of its walk.
     pub(super) fn assumed_scale_sd(&self) -> f64 {
-        if self.source == HeightSource::Assumed { self.sd_m / self.height_m } else { 0.0 }
+        match self.source {
+            HeightSource::Assumed => self.sd_m / self.height_m,
+            HeightSource::Measured => self.scale_sd,
+            HeightSource::Given => 0.0,
+        }
+    }
+
+    /// Standard deviation of the height in the scale of the camera, metres: that of a measured one without the scale's, that
+    /// of a given one with it.
+    pub(super) fn sd_in_camera_m(&self) -> f64 {
+        let of_scale_m = self.scale_sd * self.height_m;
+        match self.source {
+            HeightSource::Measured => (self.sd_m.powi(2) - of_scale_m.powi(2)).max(0.0).sqrt(),
+            HeightSource::Given => self.sd_m.hypot(of_scale_m),
+            HeightSource::Assumed => self.sd_m,
+        }
+    }
+
+    /// Relative standard deviation of the scale of a camera that is assumed from this height.
+    pub(super) fn relative_sd(&self) -> f64 {
+        self.sd_m / self.height_m
     }
 
     /// How far another measurement is from it, standard deviations of the difference.
@@ -114,6 +151,7 @@ pub(super) fn from_rectangles(
         height_m,
         sd_m: RECTANGLE_SD_M,
         source: HeightSource::Measured,
+        scale_sd: 0.0,
     })
 }
 
@@ -121,7 +159,8 @@ pub(super) fn from_rectangles(
 pub(super) fn combined(a: &BodyHeight, b: &BodyHeight) -> BodyHeight {
     let [of_a, of_b] = [a, b].map(|height| height.sd_m.powi(-2));
     let height_m = (of_a * a.height_m + of_b * b.height_m) / (of_a + of_b);
-    BodyHeight { height_m, sd_m: (of_a + of_b).sqrt().recip(), source: HeightSource::Measured }
+    let sd_m = (of_a + of_b).sqrt().recip();
+    BodyHeight { height_m, sd_m, source: HeightSource::Measured, scale_sd: 0.0 }
 }
 
 #[cfg(test)]
@@ -153,6 +192,27 @@ mod tests {
         Camera::level([1280, 720], 1.08, 1.2, 5.0).unwrap()
     }
 
+    fn measured(height_m: f64) -> BodyHeight {
+        BodyHeight { height_m, sd_m: 0.04, source: HeightSource::Measured, scale_sd: 0.0 }
+    }
+
+    /// The first person is 1.70 ± 0.10 m tall, so everything beside is known to 6 %.
+    #[test]
+    fn a_height_measured_against_another_person_s_is_no_better_known_than_that() {
+        let scale_sd = BodyHeight::POPULATION.relative_sd();
+        let second = measured(1.87).on_scale(scale_sd);
+        assert!((second.sd_m - 0.04f64.hypot(0.11)).abs() < 1e-12, "{second:?}");
+        assert!((second.assumed_scale_sd() - 0.1 / 1.7).abs() < 1e-12, "so are its lengths");
+        // A person whose height is given has its own scale, and the picture contradicts it less surely.
+        let given = BodyHeight::given(1.6).on_scale(scale_sd);
+        assert_eq!((given.sd_m, given.assumed_scale_sd()), (GIVEN_SD_M, 0.0));
+        assert!(given.contradicts(&measured(1.87)) && !given.contradicts(&second));
+        // In that camera, the measured height is as well known as in a calibrated one, and the given one is not.
+        assert!((second.sd_in_camera_m() - 0.04).abs() < 1e-12);
+        assert!((given.sd_in_camera_m() - GIVEN_SD_M.hypot(1.6 * scale_sd)).abs() < 1e-12);
+        assert_eq!(measured(1.7).on_scale(0.0), measured(1.7));
+    }
+
     #[test]
     fn a_calibrated_camera_shows_the_height_at_the_start() {
         let options = TrackerOptions { camera: Some(camera()), ..TrackerOptions::default() };
@@ -179,7 +239,7 @@ mod tests {
 
     #[test]
     fn heights_three_standard_deviations_apart_contradict_each_other() {
-        let measured = |height_m| BodyHeight { height_m, sd_m: 0.03, source: HeightSource::Measured };
+        let measured = |height_m| BodyHeight { sd_m: 0.03, ..measured(height_m) };
         let apart_m = 3.0 * 0.02f64.hypot(0.03);
         assert!(!BodyHeight::given(1.7).contradicts(&measured(1.7 + apart_m - 1e-9)));
         assert!(BodyHeight::given(1.7).contradicts(&measured(1.7 - apart_m - 1e-9)));

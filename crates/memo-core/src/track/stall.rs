@@ -45,7 +45,7 @@ impl Active {
         let (sightings, frames): (Vec<Sighting>, Vec<&FrameEdges>) =
             kept.iter().filter_map(|(sighting, edges)| Some(((*sighting)?, edges))).unzip();
         let walker = Walker { style, ..self.average.clone() };
-        let crown = Crown { height_m: walker.level_crown_height_m(), sd_m: self.height.sd_m };
+        let crown = Crown { height_m: walker.level_crown_height_m(), sd_m: self.height.sd_in_camera_m() };
         let course = locate(&sightings, &self.camera, &crown).ok()?;
         let start = start(&frames, &course, &walker, &self.camera, &options.cadence, &options.walk)?;
         let mut walk = Walk::new(walker, start.path, start.beginning);

@@ -606,6 +606,12 @@ impl Tracker {
         self.options.camera.as_ref().or(self.people.first().map(|active| &active.camera))
     }
 
+    /// Relative standard deviation of the scale of that camera, if it is that of somebody who is followed.
+    fn scale_sd(&self) -> f64 {
+        let borrowed = self.people.first().filter(|_| self.options.camera.is_none());
+        borrowed.map_or(0.0, |active| active.height.relative_sd().max(active.height.scale_sd))
+    }
+
     /// Starts walks on candidates that have enough frames, or drops their oldest ones.
     fn start(&mut self, evidence: &Evidence) {
         let size = [evidence.grey.width() as u32, evidence.grey.height() as u32];
@@ -616,7 +622,7 @@ impl Tracker {
             }
             let height_m = self.options.height_of(self.identities.count());
             let (options, camera, tilt) = (&self.options, self.camera(), self.tilt);
-            let given = Given { options, camera, tilt, height_m, size };
+            let given = Given { options, camera, tilt, scale_sd: self.scale_sd(), height_m, size };
             let begun = candidate.begin(&given);
             let is_new = |active: &Active| self.is_somebody_else(active);
             let begun =

@@ -137,7 +137,8 @@ impl<'a> Problem<'a> {
     /// The same of a person whose height is only known as well as this.
     pub fn of_height(mut self, height: &BodyHeight) -> Self {
         let height_m = self.walker.body.height_m;
-        self.excess = Prior { mean: height.height_m / height_m - 1.0, sd: height.sd_m / height_m };
+        self.excess =
+            Prior { mean: height.height_m / height_m - 1.0, sd: height.sd_in_camera_m() / height_m };
         self
     }
 

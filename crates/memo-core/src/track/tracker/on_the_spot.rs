@@ -88,7 +88,7 @@ impl Tracker {
         let height_m = options.height_of(self.identities.count());
         let height = start_height(options, height_m, camera, sightings);
         let walker = options.walker(height.height_m, COMFORTABLE_MPS).ok()?;
-        let given = Given { options, camera, tilt: self.tilt, height_m, size };
+        let given = Given { options, camera, tilt: self.tilt, scale_sd: 0.0, height_m, size };
         let (camera, course) = course(sightings, &given, walker.level_crown_height_m(), &height).ok()?;
         Some(Spot { camera, tilt: self.tilt, course, height, walker, backdrop: &self.backdrop, options })
     }

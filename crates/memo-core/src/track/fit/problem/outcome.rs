@@ -124,6 +124,7 @@ impl Problem<'_> {
             height_m: height_m * (1.0 + seen),
             sd_m: (SD_FACTOR * height_m / weight.sqrt()).hypot(HEIGHT_MODEL_SD_M),
             source: HeightSource::Measured,
+            scale_sd: 0.0,
         })
     }
 
