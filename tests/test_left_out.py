@@ -166,7 +166,7 @@ def test_a_point_where_nobody_is_finds_nobody(memo_command, tmp_path):
     code, complained = followed(f"{place}@{frame}")
     assert code == Exit.TRACKED and "nobody" not in complained
     code, complained = followed(f"{place}@100000")
-    assert code == Exit.NOBODY and "nor anywhere in this frame, but person 1 in frames " in complained
+    assert code == Exit.NOBODY and "nor anywhere in this frame, but person 1 (frames " in complained
 
 
 def test_a_flickering_lamp_changes_little(scene):

@@ -410,8 +410,10 @@ def _not_there(track: Track, point: Point, first_frame: int) -> str:
             middles.append(f"person {columns['person'][row] + 1} at {u_px:.0f},{v_px:.0f}@{point.frame}")
     if middles:
         return f"{said}, but {' and '.join(middles)}: the results are those of everybody"
-    frames = [columns["frame"][columns["person"] == person] + first_frame for person in set(track.people)]
-    known = [f"person {k + 1} in frames {own.min()} to {own.max()}" for k, own in enumerate(frames)]
+    known = []
+    for person in sorted(set(track.people)):
+        own = columns["frame"][columns["person"] == person] + first_frame
+        known.append(f"person {person + 1} (frames {own.min()} to {own.max()})")
     return (
         f"{said}, nor anywhere in this frame, but {' and '.join(known)}: the results are those of everybody"
     )

@@ -418,7 +418,9 @@ impl Thing {
             let is_followed = (walk_boxes.started + 1..=walk_boxes.shots.last.frame).contains(&shot.frame);
             tall += usize::from(is_within && is_tall && is_followed);
         }
-        let is_beside = 2 * tall > self.shots.all().len();
+        // Of somebody who leaves the image, the part at its border is as tall.
+        let is_cut_off = 2 * self.hindered[0] > self.shots.seen;
+        let is_beside = 2 * tall > self.shots.all().len() && !is_cut_off;
         within > apart && !is_beside
     }
 
@@ -798,6 +800,13 @@ mod tests {
         assert_eq!(left_out_beside(90, shadow, None).len(), 1);
         let far = |frame: usize| vec![hindered(boxed(500 - 4 * frame, 100, 60, 200), Hindrance::CutOff)];
         assert_eq!(left_out_beside(90, far, walk()).len(), 1, "who walks the other way is somebody else");
+        // The arm ahead of somebody who leaves the image, against the border.
+        let leaving = |frame: usize| match frame {
+            70..80 => vec![hindered(boxed(60 + 4 * frame, 110, 20, 180), Hindrance::CutOff)],
+            _ => vec![],
+        };
+        assert!(left_out_beside(90, leaving, Some(walk_boxes(0..90))).is_empty());
+        assert_eq!(left_out_beside(90, leaving, None).len(), 1);
         let beside =
             |frame: usize| vec![Noticed { beside: true, ..seen(boxed(50 + 4 * frame, 105, 40, 190)) }];
         let all_along = Some(walk_boxes(0..90));
