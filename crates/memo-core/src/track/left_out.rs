@@ -11,7 +11,7 @@
 //! Limits: several people who move as one region are one thing; somebody who is hidden for longer than [`GAP_S`] is two.
 //!
 //! Memory does not grow with the length of the stream: at most [`MOST_THINGS`] things are open and [`MOST_CLOSED`] wait
-//! for the end of a walk, each with [`MOST_SHOTS`] rectangles; [`MOST_WALKS`] walks are remembered while things of
+//! for the end of a walk, each with [`MOST_SHOTS`] rectangles; [`MOST_TRAILS`] walks are remembered while things of
 //! their time are undecided; of those who were left out, the [`MOST_LEFT_OUT`] that were seen longest are kept, and all are
 //! counted.
 
@@ -34,7 +34,7 @@ pub const MOST_CLOSED: usize = 256;
 /// Rectangles kept of a thing, evenly over its time.
 pub const MOST_SHOTS: usize = 64;
 /// Walks remembered for things that are undecided.
-pub const MOST_WALKS: usize = 128;
+pub const MOST_TRAILS: usize = 128;
 /// Those who were left out that are kept, the ones that were seen longest.
 pub const MOST_LEFT_OUT: usize = 100;
 /// Rectangles kept of a walk, evenly over its time.
@@ -270,18 +270,18 @@ impl Shots {
 
 /// Where somebody was in the frames of a walk.
 #[derive(Debug, Clone)]
-pub(super) struct WalkBoxes {
+pub(super) struct Trail {
     shots: Shots,
     /// The frame in which the walk was started, after its first ones: until then, its regions were those of a candidate.
     started: usize,
 }
 
-impl WalkBoxes {
+impl Trail {
     /// From the frames in order; `None` without any.
     pub fn new(mut shots: impl Iterator<Item = Shot>, started: usize) -> Option<Self> {
-        let mut walk_boxes = Shots::new(shots.next()?, MOST_STEPS);
-        shots.for_each(|shot| walk_boxes.push(shot));
-        Some(Self { shots: walk_boxes, started })
+        let mut trail = Shots::new(shots.next()?, MOST_STEPS);
+        shots.for_each(|shot| trail.push(shot));
+        Some(Self { shots: trail, started })
     }
 
     /// The box at a time, extrapolated for up to [`GAP_S`].
@@ -405,17 +405,17 @@ impl Thing {
 
     /// True if it belongs to somebody: while both are there, and shortly before and after, it is mostly in that person's
     /// box; as tall a region that is there all the time is somebody else, beside or behind.
-    fn belongs_to(&self, walk_boxes: &WalkBoxes) -> bool {
+    fn belongs_to(&self, trail: &Trail) -> bool {
         let (mut within, mut apart, mut tall) = (0, 0, 0);
         for shot in self.shots.all() {
-            let Some(own) = walk_boxes.at(shot.time_s) else { continue };
+            let Some(own) = trail.at(shot.time_s) else { continue };
             let margin = EXPLAINED * (own.bottom - own.top);
             let at = middle(&shot.rectangle);
             let is_within = (own.left - margin..=own.right + margin).contains(&at.x)
                 && (own.top - margin..=own.bottom + margin).contains(&at.y);
             *(if is_within { &mut within } else { &mut apart }) += 1;
             let is_tall = shot.rectangle.height() as f64 >= AS_TALL * (own.bottom - own.top);
-            let is_followed = (walk_boxes.started + 1..=walk_boxes.shots.last.frame).contains(&shot.frame);
+            let is_followed = (trail.started + 1..=trail.shots.last.frame).contains(&shot.frame);
             tall += usize::from(is_within && is_tall && is_followed);
         }
         // Of somebody who leaves the image, the part at its border is as tall.
@@ -486,7 +486,7 @@ impl Thing {
 pub(super) struct Unfollowed {
     open: Vec<Thing>,
     closed: Vec<Thing>,
-    walks: Vec<WalkBoxes>,
+    trails: Vec<Trail>,
     left_out: Vec<LeftOut>,
     count: usize,
 }
@@ -542,17 +542,17 @@ impl Unfollowed {
     }
 
     /// Notes a walk: what belongs to it is not left out.
-    pub fn followed(&mut self, walk_boxes: WalkBoxes) {
-        self.walks.push(walk_boxes);
-        let excess = self.walks.len().saturating_sub(MOST_WALKS);
-        self.walks.drain(..excess);
+    pub fn followed(&mut self, trail: Trail) {
+        self.trails.push(trail);
+        let excess = self.trails.len().saturating_sub(MOST_TRAILS);
+        self.trails.drain(..excess);
     }
 
     /// Notes a walk that was none after all.
-    pub fn withdrawn(&mut self, walk_boxes: WalkBoxes, reason: Reason) {
-        let mut own = self.open.extract_if(.., |thing| thing.belongs_to(&walk_boxes)).collect::<Vec<_>>();
-        own.extend(self.closed.extract_if(.., |thing| thing.belongs_to(&walk_boxes)));
-        let mut thing = Thing::new(Shots { most: MOST_SHOTS, ..walk_boxes.shots });
+    pub fn withdrawn(&mut self, trail: Trail, reason: Reason) {
+        let mut own = self.open.extract_if(.., |thing| thing.belongs_to(&trail)).collect::<Vec<_>>();
+        own.extend(self.closed.extract_if(.., |thing| thing.belongs_to(&trail)));
+        let mut thing = Thing::new(Shots { most: MOST_SHOTS, ..trail.shots });
         own.iter().for_each(|other| thing.join(other));
         thing.refuse(reason);
         self.open.push(thing);
@@ -561,10 +561,10 @@ impl Unfollowed {
     /// Decides on the things that are gone and whose walks have ended: `since_s` is when the first walk that goes on
     /// began, infinity if none does.
     pub fn settle(&mut self, since_s: f64, start_frames: usize) {
-        let walks = &self.walks;
+        let trails = &self.trails;
         let decided = self.closed.extract_if(.., |thing| thing.shots.last.time_s + GAP_S < since_s);
         let left = decided.filter(|thing| {
-            thing.is_notable(start_frames) && !walks.iter().any(|walk_boxes| thing.belongs_to(walk_boxes))
+            thing.is_notable(start_frames) && !trails.iter().any(|trail| thing.belongs_to(trail))
         });
         let left: Vec<LeftOut> = left.map(|thing| thing.left_out()).collect();
         self.count += left.len();
@@ -575,14 +575,14 @@ impl Unfollowed {
         }
         let things = self.open.iter().chain(&self.closed);
         let first_s = things.map(|thing| thing.shots.first().time_s).fold(f64::INFINITY, f64::min);
-        self.walks.retain(|walk_boxes| walk_boxes.shots.last.time_s + 2.0 * GAP_S >= first_s.min(since_s));
+        self.trails.retain(|trail| trail.shots.last.time_s + 2.0 * GAP_S >= first_s.min(since_s));
     }
 
     /// Ends the stream or the view, after the walks.
     pub fn finish(&mut self, start_frames: usize) {
         self.closed.append(&mut self.open);
         self.settle(f64::INFINITY, start_frames);
-        self.walks.clear();
+        self.trails.clear();
     }
 }
 
@@ -674,21 +674,21 @@ mod tests {
     fn left_out_beside(
         frames: usize,
         regions: impl Fn(usize) -> Vec<Noticed>,
-        walk_boxes: Option<WalkBoxes>,
+        trail: Option<Trail>,
     ) -> Vec<LeftOut> {
         let mut unfollowed = Unfollowed::default();
         for frame in 0..frames {
             unfollowed.notice(frame, 0.04 * frame as f64, &regions(frame));
         }
-        walk_boxes.into_iter().for_each(|walk_boxes| unfollowed.followed(walk_boxes));
+        trail.into_iter().for_each(|trail| unfollowed.followed(trail));
         unfollowed.finish(START_FRAMES);
         unfollowed.left_out()
     }
 
     /// The walk of [`walking`] in these frames, which started in its thirteenth.
-    fn walk_boxes(frames: std::ops::Range<usize>) -> WalkBoxes {
+    fn trail(frames: std::ops::Range<usize>) -> Trail {
         let started = frames.start + START_FRAMES - 1;
-        WalkBoxes::new(frames.map(|frame| shot(frame, walking(frame))), started).unwrap()
+        Trail::new(frames.map(|frame| shot(frame, walking(frame))), started).unwrap()
     }
 
     fn reasons(left_out: &[LeftOut]) -> Vec<&'static str> {
@@ -786,7 +786,7 @@ mod tests {
 
     #[test]
     fn what_belongs_to_somebody_who_is_followed_is_not_left_out() {
-        let walk = || Some(walk_boxes(30..60));
+        let walk = || Some(trail(30..60));
         let cut_off = |frame: usize| vec![hindered(walking(frame), Hindrance::CutOff)];
         let within = |frames: std::ops::Range<usize>| {
             let there = |frame: usize| if frames.contains(&frame) { cut_off(frame) } else { vec![] };
@@ -809,7 +809,7 @@ mod tests {
         assert_eq!(left_out_beside(90, leaving, None).len(), 1);
         let beside =
             |frame: usize| vec![Noticed { beside: true, ..seen(boxed(50 + 4 * frame, 105, 40, 190)) }];
-        let all_along = Some(walk_boxes(0..90));
+        let all_along = Some(trail(0..90));
         let found = left_out_beside(90, |frame| if frame >= 13 { beside(frame) } else { vec![] }, all_along);
         assert_eq!(reasons(&found), ["beside somebody"], "as tall as the one who is followed");
     }
@@ -820,7 +820,7 @@ mod tests {
         for frame in 0..30 {
             unfollowed.notice(frame, 0.04 * frame as f64, &[hindered(walking(frame), Hindrance::CutOff)]);
         }
-        unfollowed.withdrawn(walk_boxes(18..60), Reason::NotWalking);
+        unfollowed.withdrawn(trail(18..60), Reason::NotWalking);
         unfollowed.finish(START_FRAMES);
         let found = unfollowed.left_out();
         assert_eq!(reasons(&found), ["not walking"]);
@@ -836,23 +836,23 @@ mod tests {
             unfollowed.settle(0.8, START_FRAMES);
         }
         assert_eq!(unfollowed.count(), 0, "a walk that began in frame 20 goes on");
-        unfollowed.followed(walk_boxes(20..80));
+        unfollowed.followed(trail(20..80));
         unfollowed.settle(f64::INFINITY, START_FRAMES);
-        assert_eq!((unfollowed.count(), unfollowed.walks.len()), (0, 0));
+        assert_eq!((unfollowed.count(), unfollowed.trails.len()), (0, 0));
     }
 
     #[test]
     fn a_trail_is_where_the_person_was_and_shortly_before_and_after() {
-        let walk_boxes = walk_boxes(25..75);
+        let trail = trail(25..75);
         for frame in [1usize, 10, 25, 40, 74, 90, 99] {
-            let at = walk_boxes.at(0.04 * frame as f64).unwrap();
+            let at = trail.at(0.04 * frame as f64).unwrap();
             let true_box = walking(frame).sides(0.0);
             assert!(
                 (at.left - true_box.left).abs() < 1e-6 && (at.right - true_box.right).abs() < 1e-6,
                 "{frame}"
             );
         }
-        assert!(walk_boxes.at(-0.1).is_none() && walk_boxes.at(0.04 * 101.0).is_none());
+        assert!(trail.at(-0.1).is_none() && trail.at(0.04 * 101.0).is_none());
     }
 
     #[test]
@@ -867,10 +867,10 @@ mod tests {
             unfollowed.notice(frame, 0.04 * frame as f64, shown);
             unfollowed.settle(if frame < 2000 { 0.0 } else { f64::INFINITY }, START_FRAMES);
             if frame % 10 == 0 {
-                unfollowed.followed(walk_boxes(frame..frame + 20));
+                unfollowed.followed(trail(frame..frame + 20));
             }
             assert!(unfollowed.open.len() <= MOST_THINGS && unfollowed.closed.len() <= MOST_CLOSED);
-            assert!(unfollowed.walks.len() <= MOST_WALKS && unfollowed.left_out.len() <= MOST_LEFT_OUT);
+            assert!(unfollowed.trails.len() <= MOST_TRAILS && unfollowed.left_out.len() <= MOST_LEFT_OUT);
             assert!(unfollowed.open.iter().all(|thing| thing.shots.kept.len() <= MOST_SHOTS));
         }
         unfollowed.finish(START_FRAMES);
