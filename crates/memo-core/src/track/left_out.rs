@@ -805,7 +805,7 @@ mod tests {
             70..80 => vec![hindered(boxed(60 + 4 * frame, 110, 20, 180), Hindrance::CutOff)],
             _ => vec![],
         };
-        assert!(left_out_beside(90, leaving, Some(walk_boxes(0..90))).is_empty());
+        assert!(left_out_beside(90, leaving, Some(trail(0..90))).is_empty());
         assert_eq!(left_out_beside(90, leaving, None).len(), 1);
         let beside =
             |frame: usize| vec![Noticed { beside: true, ..seen(boxed(50 + 4 * frame, 105, 40, 190)) }];
