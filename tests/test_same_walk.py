@@ -14,6 +14,8 @@ from memo.video import VideoReader
 from PIL import Image
 
 CLIP, HEIGHT_M = "BELT_C__clothes2", 1.66
+#: Of six clips, one changed by 1.9 degrees, this one by 0.6 at most.
+MOST_OFF_DEG = 1.0
 OTHER = {"right": "left", "left": "right"}
 
 
@@ -78,5 +80,5 @@ def test_other_pictures_of_a_walk_give_the_same_numbers(tracked, plain, name):
         for joint in ("hip", "knee"):
             angle, sd = (plain.columns[f"{first}{side}_{joint}_deg"][at[0]] for first in ("", "sd_"))
             again = other.columns[f"{there}_{joint}_deg"][at[1]]
-            off, least_sd = np.sqrt(np.nanmean((angle - again) ** 2)), np.nanmean(sd)
-            assert off < least_sd, (side, joint, off, least_sd)
+            off = np.sqrt(np.nanmean((angle - again) ** 2))
+            assert off < min(MOST_OFF_DEG, np.nanmean(sd)), (side, joint, off)

@@ -94,11 +94,23 @@ pub struct Sides {
 impl Sides {
     /// Area of the intersection of two boxes over that of their union.
     pub fn overlap(&self, other: &Self) -> f64 {
+        let shared = self.shared_area(other);
+        shared / (self.area() + other.area() - shared)
+    }
+
+    /// Area of the intersection of two boxes over that of the smaller one.
+    pub fn overlap_of_smaller(&self, other: &Self) -> f64 {
+        self.shared_area(other) / self.area().min(other.area())
+    }
+
+    fn area(&self) -> f64 {
+        (self.right - self.left) * (self.bottom - self.top)
+    }
+
+    fn shared_area(&self, other: &Self) -> f64 {
         let shared = |low: f64, high: f64| (high - low).max(0.0);
         let width = shared(self.left.max(other.left), self.right.min(other.right));
-        let height = shared(self.top.max(other.top), self.bottom.min(other.bottom));
-        let area = |sides: &Self| (sides.right - sides.left) * (sides.bottom - sides.top);
-        width * height / (area(self) + area(other) - width * height)
+        width * shared(self.top.max(other.top), self.bottom.min(other.bottom))
     }
 }
 

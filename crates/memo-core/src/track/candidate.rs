@@ -7,7 +7,7 @@ use super::decisions::{
 use super::fit::views::Piece;
 use super::height::{BodyHeight, GIVEN_SD_M};
 use super::left_out::Reason;
-use super::locate::{Course, Crown, LocateError, Sighting, camera_from_sightings, locate};
+use super::locate::{Course, Crown, LocateError, Sighting, camera_from_sightings, locate, same_person};
 use super::options::TrackerOptions;
 use super::options::start_height;
 use super::start::{StartReport, StartSearch};
@@ -237,34 +237,27 @@ pub(super) fn course(
     crown_m: f64,
     height: &BodyHeight,
 ) -> Result<(Camera, Course), LocateError> {
-    let Some(camera) = given.camera else {
-        // The assumed camera has the scale of the height, so in it the height is known. Its error moves the walk
-        // nearer or farther with all its lengths.
-        let field_of_view_rad =
-            given.options.field_of_view_rad.unwrap_or_else(|| assumed_field_of_view_rad(given.size));
-        let tilt = given.tilt.map_or(Tilt::default(), |estimate| estimate.tilt);
-        let camera = camera_from_sightings(sightings, given.size, field_of_view_rad, crown_m, &tilt)?;
-        let crown = Crown { height_m: crown_m, sd_m: GIVEN_SD_M };
-        let course = locate(sightings, &camera, &crown)?;
-        let distance_m = course.path.distance(camera.position().truncate());
-        let depth_sd_m = course.depth_sd_m.hypot(height.assumed_scale_sd() * distance_m);
-        return Ok((camera, Course { depth_sd_m, ..course }));
+    // An assumed camera has the scale of the height, so in it the height is known.
+    let (camera, sd_m) = match given.camera {
+        Some(camera) => (camera.clone(), height.sd_in_camera_m()),
+        None => {
+            let field_of_view_rad =
+                given.options.field_of_view_rad.unwrap_or_else(|| assumed_field_of_view_rad(given.size));
+            let tilt = given.tilt.map_or(Tilt::default(), |estimate| estimate.tilt);
+            let camera = camera_from_sightings(sightings, given.size, field_of_view_rad, crown_m, &tilt)?;
+            (camera, GIVEN_SD_M)
+        }
     };
-    let course = locate(sightings, camera, &Crown { height_m: crown_m, sd_m: height.sd_in_camera_m() })?;
+    let course = locate(sightings, &camera, &Crown { height_m: crown_m, sd_m })?;
+    // The error of the scale moves the walk nearer or farther with all its lengths.
     let distance_m = course.path.distance(camera.position().truncate());
     let depth_sd_m = course.depth_sd_m.hypot(height.assumed_scale_sd() * distance_m);
-    Ok((camera.clone(), Course { depth_sd_m, ..course }))
+    Ok((camera, Course { depth_sd_m, ..course }))
 }
 
 /// True if the rectangle touches the lower border in most frames. A reflection touches it only now and then.
 pub(super) fn feet_cut_off(sightings: &[Sighting], height: usize) -> bool {
     2 * sightings.iter().filter(|s| s.rectangle.bottom + 2 >= height).count() > sightings.len()
-}
-
-/// True if two rectangles of neighbouring frames can enclose the same person.
-pub(super) fn same_person(a: &Rectangle, b: &Rectangle) -> bool {
-    let ratio = a.height() as f64 / b.height() as f64;
-    a.gap(b) == [0, 0] && (0.6..1.6).contains(&ratio)
 }
 
 #[cfg(test)]

@@ -193,7 +193,8 @@ pub(in crate::track) const REACH_COUNTS: f64 = 1.35;
 pub(in crate::track) const POSTURE_SD: f64 = 0.015;
 /// Standard deviation of a fitted contact, and of the errors that a person's initial contacts and toe-offs have in common,
 /// seconds. Toe-offs of three drawn people are 0 to 18 ms early, those of two filmed ones 93 and 107: shoes bend at
-/// the toes, and the model's foot does not, so it leaves the ground when the heel rises. The root of their mean square.
+/// the toes, and the model's foot does not, so it leaves the ground when the heel rises. The root of their mean square. Not counted is
+/// CMU12, whose toes move forward, back, and forward again.
 pub(in crate::track) const CONTACT_SD_S: f64 = 0.028;
 pub(in crate::track) const CONTACT_COMMON_SD_S: f64 = 0.015;
 pub(in crate::track) const TOE_OFF_COMMON_SD_S: f64 = 0.064;

@@ -262,6 +262,12 @@ fn check_size(camera: &Camera, foot: &DVec3, height_m: f64, got_px: f64) -> Resu
     Err(LocateError::Size { height_m, distance_m, expected_px, got_px })
 }
 
+/// True if two rectangles of neighbouring frames can enclose the same person.
+pub(super) fn same_person(a: &Rectangle, b: &Rectangle) -> bool {
+    let ratio = a.height() as f64 / b.height() as f64;
+    a.gap(b) == [0, 0] && (0.6..1.6).contains(&ratio)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

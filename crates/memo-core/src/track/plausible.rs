@@ -54,7 +54,7 @@ impl Walk {
     }
 
     /// True if the other walk, of the same frames, has a walk ratio that people have, and this one has not: then its phase
-    /// went wrong. At a wrong frame rate, neither has.
+    /// went wrong. At a wrong frame rate or on a treadmill, neither has. The limits are those of walking forwards.
     pub(super) fn is_less_usual_than(&self, other: &Self, height_m: f64) -> bool {
         let is_usual = |walk: &Self| walk.ratio(height_m).is_none_or(|ratio| ratio.is_usual());
         is_usual(other) && !is_usual(self)

@@ -623,12 +623,10 @@ impl Tracker {
             let height_m = self.options.height_of(self.identities.count());
             let (options, camera, tilt) = (&self.options, self.camera(), self.tilt);
             let given = Given { options, camera, tilt, scale_sd: self.scale_sd(), height_m, size };
-            let begun = candidate.begin(&given);
-            let is_new = |active: &Active| self.is_somebody_else(active);
-            let begun =
-                begun.and_then(|active| if is_new(&active) { Ok(active) } else { Err(Reason::Beside) });
-            let begun = begun
-                .and_then(|active| if self.is_left_over(&active) { Err(Reason::Beside) } else { Ok(active) });
+            let begun = candidate.begin(&given).and_then(|active| {
+                let is_own = self.is_somebody_else(&active) && !self.is_left_over(&active);
+                if is_own { Ok(active) } else { Err(Reason::Beside) }
+            });
             match begun {
                 Ok(mut active) => {
                     self.candidates.remove(n);
@@ -680,7 +678,7 @@ impl Tracker {
         let standing = active.standing();
         active.trim();
         let started = self.started.remove(&active.person);
-        let trail = trail(&active, started.unwrap_or(usize::MAX - 1));
+        let trail = trail(&active, started);
         if !active.is_walk() {
             self.withdraw(&active, trail, Reason::NotWalking);
             return;

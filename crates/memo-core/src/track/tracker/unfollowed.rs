@@ -30,8 +30,8 @@ pub(super) fn with_small_ones(group: &GroupOptions) -> GroupOptions {
     GroupOptions { min_area: group.min_area / 4, ..*group }
 }
 
-/// Where somebody was in the frames of a walk, who is followed from frame `started` on.
-pub(super) fn trail(active: &Active, started: usize) -> Option<Trail> {
+/// Where somebody was in the frames of a walk that was started in a frame, if it was.
+pub(super) fn trail(active: &Active, started: Option<usize>) -> Option<Trail> {
     let shot = |step: &super::super::walk::Step| {
         let hypothesis = step.state.hypothesis();
         let body = active.scene(hypothesis.along_m).pose(&hypothesis).cylinders;

@@ -1,0 +1,192 @@
+use super::super::unknowns::{ALONG, HEIGHT};
+use super::*;
+use crate::image::Image;
+use crate::synth::scene::{SceneOptions, SynthScene, Truth};
+use crate::track::search::tests::{camera, walker};
+
+#[test]
+fn a_short_walk_and_an_empty_picture_are_no_person() {
+    let (camera, walker, options) = (camera(), walker(), FitOptions::default());
+    let path = Path { origin: DVec2::ZERO, heading_rad: 0.0 };
+    let grey = Image::filled(640, 480, 90u8);
+    let frame = |k: usize| FitFrame {
+        time_s: 0.04 * k as f64,
+        view: View {
+            corner: [0, 0],
+            grey: grey.clone(),
+            background: Some(grey.clone()),
+            others: Vec::new(),
+            crown_px: None,
+        },
+        visible: 1.0,
+        start: Hypothesis { along_m: 0.05 * k as f64, height_m: 0.9, phase: 0.04 * k as f64 },
+    };
+    let fit = |count: usize| {
+        let frames: Vec<FitFrame> = (0..count).map(frame).collect();
+        Problem::new(&camera, &walker, &path.into(), &frames, &options).fit(Some(0.1))
+    };
+    assert_eq!(fit(14), Err(FitError::TooFewFrames { got: 14 }));
+    assert_eq!(fit(15), Err(FitError::Undetermined));
+}
+
+#[test]
+fn far_edges_cost_at_most_one_and_weigh_as_their_cost_rises() {
+    for x in [0.0, 0.3, 1.0, 2.5, 8.0f64] {
+        let [cost, weight] = robust(x);
+        let rise = (robust(x + 1e-6)[0] - robust(x - 1e-6)[0]) / 2e-6;
+        assert!((rise - 2.0 * x * weight).abs() < 1e-8, "{x}");
+        assert!(cost < 1.0);
+    }
+}
+
+/// A walker drawn by the model, and the frames in which the fit finds it at the true places and phases.
+struct Drawn {
+    camera: Camera,
+    walker: Walker,
+    route: Route,
+    frames: Vec<FitFrame>,
+}
+
+fn drawn() -> Drawn {
+    let options =
+        SceneOptions { seed: 3, frames: 24, empty_frames: 4, noise_sd: 1.0, ..SceneOptions::default() };
+    let scene = SynthScene::new(options).unwrap();
+    let background = scene.frame(0);
+    let frame = |truth: Truth| {
+        let half_torso_m = 0.5 * scene.walker.body.torso_length_m();
+        let height_m = truth.posed.torso_centre.z - half_torso_m;
+        FitFrame {
+            time_s: truth.time_s,
+            view: View {
+                corner: [0, 0],
+                grey: scene.frame(truth.frame),
+                background: Some(background.clone()),
+                others: Vec::new(),
+                crown_px: None,
+            },
+            visible: 1.0,
+            start: Hypothesis { height_m, ..truth.hypothesis },
+        }
+    };
+    let frames = (0..scene.len()).filter_map(|k| scene.truth(k)).map(frame).collect();
+    Drawn { camera: scene.camera, walker: scene.walker, route: scene.path.into(), frames }
+}
+
+/// What the contours say about the place along the path when the model stands beside the person.
+#[test]
+fn edges_count_the_less_the_farther_they_are() {
+    let Drawn { camera, walker, route, frames } = drawn();
+    let options = FitOptions::default();
+    let problem = Problem::new(&camera, &walker, &route, &frames, &options);
+    let mut unknowns = problem.start(0.0);
+    unknowns.whole.fill(0.0);
+    let width = problem.last_start_width(&unknowns).unwrap();
+    let px_m = problem.height_px(&unknowns).unwrap() / walker.body.height_m;
+    let mut said = |scales: f64| {
+        unknowns.frames[10][FRAME_ALONG] += scales * width.scale_px / px_m;
+        let (_, normal, ..) = problem.figure_terms(&unknowns, 10, &width, &mut Room::default());
+        unknowns.frames[10][FRAME_ALONG] -= scales * width.scale_px / px_m;
+        normal[(ALONG, ALONG)]
+    };
+    let [at, one, two] = [0.0, 1.0, 2.0].map(&mut said);
+    assert!(one < 0.6 * at && two < 0.3 * at, "{at} {one} {two}");
+}
+
+/// Changes that end farther from the head than hair makes of it draw the head there.
+#[test]
+fn the_crown_of_the_changes_draws_the_head_to_it() {
+    let Drawn { camera, walker, route, mut frames } = drawn();
+    let options = FitOptions::default();
+    let mut said = |off: Option<f64>| {
+        let at = |frames: &[FitFrame], crown_px: f64| {
+            let problem = Problem::new(&camera, &walker, &route, frames, &options);
+            let mut unknowns = problem.start(0.0);
+            unknowns.whole.fill(0.0);
+            let width = problem.last_start_width(&unknowns).unwrap();
+            let (figure, _, right, _) = problem.figure_terms(&unknowns, 10, &width, &mut Room::default());
+            let (top, _) = problem.crown(&figure, crown_px).unwrap();
+            (right[HEIGHT], top.point_px.y, width.height_px)
+        };
+        frames[10].view.crown_px = None;
+        let (_, row, height_px) = at(&frames, 0.0);
+        frames[10].view.crown_px = off.map(|off| row - off * height_px);
+        at(&frames, 0.0).0
+    };
+    let alone = said(None);
+    for off in [-0.01, 0.0, 0.01] {
+        assert_eq!(said(Some(off)), alone, "{off}");
+    }
+    let [below, above, farther] = [-0.05, 0.05, 0.1].map(|off| said(Some(off)) - alone);
+    assert!(below < 0.0 && above > 0.0 && farther > 2.0 * above, "{below} {above} {farther}");
+}
+
+/// A place that no contour shows is where the places before and after say.
+#[test]
+fn places_and_phases_change_their_speed_little_from_frame_to_frame() {
+    let Drawn { camera, walker, route, frames } = drawn();
+    let options = FitOptions::default();
+    let problem = Problem::new(&camera, &walker, &route, &frames, &options);
+    let mut unknowns = problem.start(0.0);
+    let smooth = unknowns.frames[7];
+    for (unknown, off) in [(FRAME_ALONG, 0.1), (FRAME_HEIGHT, -0.05), (FRAME_PHASE, 0.1)] {
+        unknowns.frames[7][unknown] += off;
+        let mut arrow = Arrow::new(frames.len(), FRAME_ANGLES, WHOLE);
+        problem.add_priors(&unknowns, FRAME_ANGLES, &mut arrow);
+        // All other frames are known to a millimetre or a thousandth of a cycle.
+        for k in (0..frames.len()).filter(|&k| k != 7) {
+            (0..FRAME_ANGLES).for_each(|n| arrow.add_row(&[(arrow.index(k, n), 1.0)], 0.0, 1e6));
+        }
+        (0..FRAME_ANGLES).for_each(|n| arrow.add_row(&[(arrow.index(7, n), 1.0)], 0.0, 1e-3));
+        let step = arrow.solve().unwrap().frames[7 * FRAME_ANGLES + unknown];
+        assert!((step + off).abs() < 0.05 * off.abs(), "{unknown}: {step} instead of {}", -off);
+        unknowns.frames[7] = smooth;
+    }
+}
+
+#[test]
+fn contours_inside_the_body_and_of_shoes_count_less_than_the_outline() {
+    let sample = |part: Part, is_outer: bool| Sample {
+        part,
+        point_px: DVec2::ZERO,
+        normal: DVec2::X,
+        is_outer,
+        world: DVec3::ZERO,
+        radius: DVec3::Y,
+        z: 0.0,
+        taper: 0.0,
+    };
+    let of = |part, is_outer| importance(&sample(part, is_outer));
+    assert_eq!(of(Part::RightShank, true), 1.0);
+    assert_eq!(of(Part::RightShank, false), 0.25);
+    assert_eq!(of(Part::Torso, false), 0.25);
+    assert_eq!(of(Part::LeftFoot, true), 0.5);
+    assert_eq!(of(Part::LeftForearm, true), 0.3);
+    let top = Sample { z: 0.9, ..sample(Part::LeftThigh, true) };
+    assert_eq!([importance(&top), of(Part::LeftThigh, true)], [0.3, 1.0]);
+}
+
+/// Of a person of whom half is hidden, the same outlines are half of the evidence.
+#[test]
+fn the_sides_of_who_is_hidden_in_part_are_less_certain() {
+    let Drawn { camera, walker, route, mut frames } = drawn();
+    let options = FitOptions::default();
+    let fitted = |cost: f64| {
+        let mut arrow = Arrow::new(1, 1, 1);
+        arrow.add_row(&[(0, 1.0)], 0.0, 1.0);
+        arrow.add_whole_row(&[(0, 1.0)], 0.0, 1.0);
+        Fitted {
+            unknowns: Unknowns { whole: Vec::new(), frames: Vec::new() },
+            seen: Seen { cost, inner: 100.0, outer: 500.0, ..Seen::default() },
+            solution: arrow.solve().unwrap(),
+            height_px: 300.0,
+        }
+    };
+    let mut log_odds = || {
+        let problem = Problem::new(&camera, &walker, &route, &frames, &options);
+        let p = problem.p_other_sides(&fitted(10.0), &fitted(12.0), 0.5);
+        frames.iter_mut().step_by(2).for_each(|frame| frame.visible = 0.0);
+        ((1.0 - p) / p).ln()
+    };
+    let [whole, half] = [log_odds(), log_odds()];
+    assert!(whole > 0.5 && (half - 0.5 * whole).abs() < 1e-9, "{whole} {half}");
+}
