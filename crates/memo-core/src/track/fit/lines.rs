@@ -10,8 +10,7 @@
 
 use super::unknowns::{
     ACROSS, ALONG, ANGLES, ANKLE, BODY, CROWN, FOOT, FOREARM, HEAD_FORWARD, HEADING, HEEL, HEIGHT, HIP_WIDTH,
-    JOINTS, LEAN, PELVIS, SHANK, SHANK_TILT, SHOULDER_WIDTH, TAPERS, THIGH, THIGH_TILT, TORSO, UPPER_ARM,
-    WIDTHS,
+    JOINTS, LEAN, LEG, PELVIS, SHANK, SHOULDER_WIDTH, TAPERS, THIGH, TILTS, TORSO, UPPER_ARM, WIDTHS,
 };
 use crate::model::body::Part;
 use crate::model::visibility::{PreparedView, VisibilityOptions, VisibleSegment};
@@ -292,13 +291,13 @@ impl Figure {
         let hip = joints.hip - self.pelvis;
         out.push((PELVIS, DVec3::Z.cross(hip)));
         out.push((BODY + HIP_WIDTH, hip / self.body.proportions.hip_half_width));
-        out.push((BODY + THIGH_TILT, sign * ahead.cross(thigh_point - joints.hip)));
+        out.push((TILTS + side * LEG, sign * ahead.cross(thigh_point - joints.hip)));
         out.push((angle(0), -bend_of_thigh.cross(thigh_point - joints.hip) - bend.cross(x - thigh_point)));
         let share = if row == 5 { down } else { 1.0 };
         out.push((BODY + THIGH, -self.axes(thigh).z_axis * (height_m * share)));
         if row >= 6 {
             let share = if row == 6 { down } else { 1.0 };
-            out.push((BODY + SHANK_TILT, sign * ahead.cross(x - joints.knee)));
+            out.push((TILTS + side * LEG + 1, sign * ahead.cross(x - joints.knee)));
             out.push((angle(1), bend.cross(x - joints.knee)));
             out.push((BODY + SHANK, -self.axes(thigh + 1).z_axis * (height_m * share)));
         }
@@ -371,13 +370,9 @@ mod tests {
         let body = super::super::unknowns::body(&Body::from_height(1.75).unwrap(), whole);
         let ahead = DVec2::from_angle(q[HEADING]);
         let pelvis = (q[ALONG] * ahead + q[ACROSS] * ahead.perp()).extend(q[HEIGHT]);
-        let side = |a: &[f64]| side_angles(a, whole);
-        let posture = Posture {
-            right: side(&q[ANGLES..]),
-            left: side(&q[ANGLES + JOINTS..]),
-            trunk_lean: q[LEAN],
-            pelvis_rotation: q[PELVIS],
-        };
+        let side = |n: usize| side_angles(&q[ANGLES + n * JOINTS..], &q[TILTS + n * LEG..]);
+        let posture =
+            Posture { right: side(0), left: side(1), trunk_lean: q[LEAN], pelvis_rotation: q[PELVIS] };
         let up = (q[LEAN].sin() * ahead).extend(q[LEAN].cos());
         let posed = body.pose(pelvis + 0.5 * body.torso_length_m() * up, q[HEADING], &posture);
         Figure { body, posed, pelvis, ahead, origin: DVec2::ZERO }
@@ -392,9 +387,8 @@ mod tests {
         q[LEAN] = 0.06;
         q[PELVIS] = 0.07;
         let angles = [0.4, 0.2, 0.1, -0.3, 0.5, -0.2, 0.6, -0.15, 0.2, 0.7];
-        q[ANGLES..BODY].copy_from_slice(&angles);
-        q[BODY + THIGH_TILT] = 0.04;
-        q[BODY + SHANK_TILT] = -0.06;
+        q[ANGLES..TILTS].copy_from_slice(&angles);
+        q[TILTS..BODY].copy_from_slice(&[0.04, -0.06, 0.07, -0.03]);
         q[BODY + TAPERS + 3] = 0.2;
         q[BODY + HEAD_FORWARD] = 0.02;
         q
@@ -460,9 +454,19 @@ mod tests {
             }
         }
         // Every coordinate but heel, foot and crown, which move ends of parts, moves some line.
-        for coordinate in
-            [ALONG, HEIGHT, HEADING, LEAN, ANGLES, ANGLES + 1, ANGLES + 8, BODY + THIGH, BODY + WIDTHS + 5]
-        {
+        for coordinate in [
+            ALONG,
+            HEIGHT,
+            HEADING,
+            LEAN,
+            ANGLES,
+            ANGLES + 1,
+            ANGLES + 8,
+            TILTS,
+            TILTS + 3,
+            BODY + THIGH,
+            BODY + WIDTHS + 5,
+        ] {
             assert!(seen[coordinate] > 0, "{coordinate}");
         }
     }

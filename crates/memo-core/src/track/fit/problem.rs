@@ -9,7 +9,7 @@ use super::seen::{LEAST_STEP, Seen};
 use super::unknowns::{
     FIGURE, FRAME, FRAME_ALONG, FRAME_ANGLES, FRAME_HEIGHT, FRAME_PHASE, JOINTS, Prior, STATURE, Slope,
     Unknowns, WHOLE, WHOLE_ACROSS, WHOLE_HEADING, WHOLE_LEAN, body, flatten, mean_of, posture, priors,
-    slopes,
+    slopes, sway_m,
 };
 use super::{FitError, FitOptions, LEAST_FRAMES, WalkFit, sides};
 use crate::estimate::arrow::{Arrow, Solution, velocity_change};
@@ -289,7 +289,7 @@ impl<'a> Problem<'a> {
         let ahead = DVec2::from_angle(heading_rad);
         let place = tangent.point(self.along(frame), 0.0).truncate();
         let turned = DVec2::from_angle(whole[WHOLE_HEADING]).rotate(place - self.origin);
-        let ground = self.origin + turned + whole[WHOLE_ACROSS] * ahead.perp();
+        let ground = self.origin + turned + sway_m(whole, frame[FRAME_PHASE]) * ahead.perp();
         let pelvis = ground.extend(frame[FRAME_HEIGHT]);
         let (sin, cos) = whole[WHOLE_LEAN].sin_cos();
         let torso_centre = pelvis + 0.5 * body.torso_length_m() * (sin * ahead).extend(cos);

@@ -12,6 +12,8 @@ use std::f64::consts::TAU;
 
 /// Joint angles of one side: hip, knee, ankle, shoulder, elbow.
 pub const JOINTS: usize = 5;
+/// Tilts of one side: thigh and shank.
+pub const LEG: usize = 2;
 
 /// Coordinates of the figure: place of the pelvis along the path, across it and above the ground, and heading.
 pub const ALONG: usize = 0;
@@ -24,8 +26,10 @@ pub const LEAN: usize = 4;
 pub const PELVIS: usize = 5;
 /// Joint angles of the right side, then of the left.
 pub const ANGLES: usize = 6;
+/// Outward tilts in the frontal plane: thigh and shank of the right side, then of the left.
+pub const TILTS: usize = ANGLES + 2 * JOINTS;
 /// Coordinates of the body, in the order of the constants below.
-pub const BODY: usize = ANGLES + 2 * JOINTS;
+pub const BODY: usize = TILTS + 2 * LEG;
 /// Number of coordinates of the figure.
 pub const FIGURE: usize = BODY + BODY_COUNT;
 
@@ -43,23 +47,22 @@ pub const FOOT: usize = 8;
 pub const HEEL: usize = 9;
 pub const HIP_WIDTH: usize = 10;
 pub const SHOULDER_WIDTH: usize = 11;
-/// Outward tilts of the thighs and of the shanks, radians.
-pub const THIGH_TILT: usize = 12;
-pub const SHANK_TILT: usize = 13;
 /// Natural logarithms of the thickness of head, torso, upper arm, forearm, hand, thigh, shank and foot.
-pub const WIDTHS: usize = 14;
+pub const WIDTHS: usize = 12;
 /// Tapers of torso, upper arm, forearm, thigh and shank: how much thicker than the middle the upper end is.
 pub const TAPERS: usize = WIDTHS + 8;
 /// Number of coordinates of the body.
 pub const BODY_COUNT: usize = TAPERS + 5;
 
-/// Unknowns of the whole: the body, then lean, heading, place across the path, the cosine and sine of the pelvis's
-/// rotation, then the series of the joint curves.
+/// Unknowns of the whole: the body, then lean, heading, place across the path, cosine and sine of the pelvis's rotation
+/// and of its sway to the left, then the series of the tilts and of the joint curves.
 pub const WHOLE_LEAN: usize = BODY_COUNT;
 pub const WHOLE_HEADING: usize = BODY_COUNT + 1;
 pub const WHOLE_ACROSS: usize = BODY_COUNT + 2;
 pub const WHOLE_PELVIS: usize = BODY_COUNT + 3;
-pub const WHOLE_SERIES: usize = BODY_COUNT + 5;
+pub const WHOLE_SWAY: usize = BODY_COUNT + 5;
+pub const WHOLE_TILTS: usize = BODY_COUNT + 7;
+pub const WHOLE_SERIES: usize = WHOLE_TILTS + LEG * TILT_TERMS;
 /// Number of unknowns of the whole.
 pub const WHOLE: usize = WHOLE_SERIES + series_start(JOINTS);
 
@@ -74,6 +77,8 @@ pub const FRAME: usize = FRAME_ANGLES + 2 * JOINTS;
 /// Harmonics of the series of each joint.
 const HARMONICS: [usize; JOINTS] = [3, 4, 2, 2, 2];
 const MOST_HARMONICS: usize = 4;
+/// Terms of the series of a tilt, the same for both sides: the mean and two harmonics.
+const TILT_TERMS: usize = 5;
 
 /// Terms of a joint's series: the mean, then a cosine and a sine per harmonic.
 const fn terms(joint: usize) -> usize {
@@ -124,7 +129,10 @@ pub struct Prior {
 /// and 0.21 to 0.30 apart between hips and shoulders. The average hip and knee curves are those of clinical models,
 /// which lie 5 and 9 degrees above the angles between joint centres (means of eight motion-captured people).
 /// Their thighs tilted outwards by -6 to 5 degrees and their shanks by -4 to -1 (four people of tuning; one more has
-/// knees that cross, which no body has). Standard deviations are chosen, and wide where clothes hide the body.
+/// knees that cross, which no body has). The thigh tilts outwards by 7 degrees more in swing than in stance, while the
+/// pelvis sways over the standing foot: means of three people of tuning, whose coefficients differ by a degree and half a
+/// centimetre; Boulic, Thalmann and Thalmann 1990 have a sway of the same phase, and 3 cm. Standard deviations are
+/// chosen, and wide where clothes hide the body.
 pub fn priors() -> Vec<Prior> {
     let deg = 1f64.to_radians();
     let mut priors = vec![Prior { mean: 0.0, sd: 1.0 }; WHOLE];
@@ -141,14 +149,15 @@ pub fn priors() -> Vec<Prior> {
         (HEEL, 0.0, 0.008),
         (HIP_WIDTH, -0.003, 0.008),
         (SHOULDER_WIDTH, -0.01, 0.012),
-        (THIGH_TILT, -1.5 * deg, 4.0 * deg),
-        (SHANK_TILT, -3.0 * deg, 2.5 * deg),
         (WHOLE_LEAN, 0.03, 0.08),
         (WHOLE_HEADING, 0.0, 0.1),
         (WHOLE_ACROSS, 0.0, 0.5),
         // The right hip is ahead at right heel strike, by 4 degrees.
         (WHOLE_PELVIS, 4.0 * deg, 3.0 * deg),
         (WHOLE_PELVIS + 1, 0.0, 3.0 * deg),
+        // The pelvis is above the standing foot: metres.
+        (WHOLE_SWAY, 0.013, 0.006),
+        (WHOLE_SWAY + 1, -0.02, 0.01),
     ] {
         priors[at] = Prior { mean, sd };
     }
@@ -168,6 +177,14 @@ pub fn priors() -> Vec<Prior> {
     }
     for (taper, mean) in [0.0, 0.0, 0.0, 0.15, 0.0].into_iter().enumerate() {
         priors[TAPERS + taper] = Prior { mean, sd: 0.3 };
+    }
+    // Mean, cosine, sine and those of twice the phase of the thigh's tilt, then of the shank's, degrees.
+    let tilts = [
+        [(-1.5, 4.0), (0.2, 1.0), (-3.4, 1.2), (-1.0, 0.5), (0.2, 0.5)],
+        [(-3.0, 2.5), (2.4, 1.5), (0.3, 1.5), (1.4, 1.0), (-1.0, 0.8)],
+    ];
+    for (n, (mean, sd)) in tilts.into_iter().flatten().enumerate() {
+        priors[WHOLE_TILTS + n] = Prior { mean: mean * deg, sd: sd * deg };
     }
     // Mean of each joint, then standard deviations of the mean and of each harmonic, degrees.
     let series = [
@@ -256,6 +273,19 @@ pub fn curves(gait: &Gait, whole: &[f64], zero: f64) -> [Vec<f64>; 2 * JOINTS] {
 /// Samples of a curve.
 pub const CURVE_SAMPLES: usize = 50;
 
+/// Outward tilts of a leg, thigh and shank, at the phase of its side.
+fn tilts(whole: &[f64], phase: f64) -> [f64; LEG] {
+    let [terms, _] = fourier(phase);
+    let series = |n: usize| &whole[WHOLE_TILTS + n * TILT_TERMS..][..TILT_TERMS];
+    std::array::from_fn(|n| terms.iter().zip(series(n)).map(|(term, x)| term * x).sum())
+}
+
+/// How far the pelvis is to the left of the path, metres.
+pub fn sway_m(whole: &[f64], phase: f64) -> f64 {
+    let (sin, cos) = (TAU * phase).sin_cos();
+    whole[WHOLE_ACROSS] + whole[WHOLE_SWAY] * cos + whole[WHOLE_SWAY + 1] * sin
+}
+
 /// A coordinate of the figure, an unknown (of the whole, then of the frame) and the derivative of one by the other.
 pub type Slope = (usize, usize, f64);
 
@@ -277,9 +307,21 @@ pub fn slopes(gait: &Gait, whole: &[f64], frame: &[f64; FRAME], slopes: &mut Vec
         (PELVIS, WHOLE_PELVIS + 1, sin),
         (PELVIS, WHOLE + FRAME_PHASE, turning),
     ]);
+    let swaying = TAU * (whole[WHOLE_SWAY + 1] * cos - whole[WHOLE_SWAY] * sin);
+    slopes.extend([
+        (ACROSS, WHOLE_SWAY, cos),
+        (ACROSS, WHOLE_SWAY + 1, sin),
+        (ACROSS, WHOLE + FRAME_PHASE, swaying),
+    ]);
     for (side, (later, sign)) in SIDES.into_iter().enumerate() {
         let phase = frame[FRAME_PHASE] + later;
         let ([terms_at, rates_at], average) = (fourier(phase), average_slope(gait, phase));
+        for n in 0..LEG {
+            let (tilt, series) = (TILTS + side * LEG + n, WHOLE_TILTS + n * TILT_TERMS);
+            slopes.extend((0..TILT_TERMS).map(|term| (tilt, series + term, terms_at[term])));
+            let rate: f64 = (0..TILT_TERMS).map(|term| rates_at[term] * whole[series + term]).sum();
+            slopes.push((tilt, WHOLE + FRAME_PHASE, rate));
+        }
         for (joint, mut rate) in average.into_iter().enumerate() {
             let (common, count, at) = (mean_of(joint), terms(joint), side * JOINTS + joint);
             for n in 0..count {
@@ -293,27 +335,27 @@ pub fn slopes(gait: &Gait, whole: &[f64], frame: &[f64; FRAME], slopes: &mut Vec
     }
 }
 
-/// The angles of one side, in the order of the joints, with the tilts of the legs from the body's coordinates.
-pub fn side_angles(a: &[f64], body: &[f64]) -> SideAngles {
+/// The angles of one side, in the order of the joints, with the tilts of its leg.
+pub fn side_angles(a: &[f64], tilts: &[f64]) -> SideAngles {
     SideAngles {
         hip: a[0],
         knee: a[1],
         ankle: a[2],
         shoulder: a[3],
         elbow: a[4],
-        thigh_tilt: body[THIGH_TILT],
-        shank_tilt: body[SHANK_TILT],
+        thigh_tilt: tilts[0],
+        shank_tilt: tilts[1],
     }
 }
 
 /// The posture of a frame.
 pub fn posture(gait: &Gait, whole: &[f64], frame: &[f64; FRAME]) -> Posture {
     let angles = angles(gait, whole, frame);
-    let side = |a: &[f64]| side_angles(a, whole);
+    let side = |n: usize| side_angles(&angles[n * JOINTS..], &tilts(whole, frame[FRAME_PHASE] + SIDES[n].0));
     let (sin, cos) = (TAU * frame[FRAME_PHASE]).sin_cos();
     Posture {
-        right: side(&angles[..JOINTS]),
-        left: side(&angles[JOINTS..]),
+        right: side(0),
+        left: side(1),
         trunk_lean: whole[WHOLE_LEAN],
         pelvis_rotation: whole[WHOLE_PELVIS] * cos + whole[WHOLE_PELVIS + 1] * sin,
     }
@@ -359,11 +401,14 @@ mod tests {
         (whole, frame)
     }
 
-    /// Angles and pelvis of the figure.
-    fn figure(whole: &[f64], frame: &[f64; FRAME]) -> Vec<f64> {
+    /// Pelvis, angles and tilts of the figure, then its sway.
+    fn figure(whole: &[f64], frame: &[f64; FRAME]) -> Vec<(usize, f64)> {
         let gait = Gait::dense();
-        let mut all = vec![posture(&gait, whole, frame).pelvis_rotation];
-        all.extend(angles(&gait, whole, frame));
+        let posture = posture(&gait, whole, frame);
+        let tilts = [posture.right, posture.left].into_iter().flat_map(|s| [s.thigh_tilt, s.shank_tilt]);
+        let turned = std::iter::once(posture.pelvis_rotation).chain(angles(&gait, whole, frame)).chain(tilts);
+        let mut all: Vec<(usize, f64)> = (PELVIS..).zip(turned).collect();
+        all.push((ACROSS, sway_m(whole, frame[FRAME_PHASE])));
         all
     }
 
@@ -383,9 +428,8 @@ mod tests {
                 figure(&whole, &frame)
             };
             let (low, high) = (moved(-1e-5), moved(1e-5));
-            for (n, (low, high)) in low.iter().zip(&high).enumerate() {
+            for (&(at, low), (_, high)) in low.iter().zip(&high) {
                 let expected = (high - low) / 2e-5;
-                let at = PELVIS + n;
                 let slope: f64 = found.iter().filter(|s| (s.0, s.1) == (at, unknown)).map(|s| s.2).sum();
                 assert!(
                     (slope - expected).abs() < 1e-3 * expected.abs().max(1.0),
