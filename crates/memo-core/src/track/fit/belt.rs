@@ -25,7 +25,7 @@ const END: f64 = 0.55;
 /// Minimum number of frames in a part.
 const LEAST_FRAMES: usize = 3;
 
-/// The belt's speed; `None` if no stance was seen from its beginning to its end. `feet` has heel and ball of the right
+/// The belt's speed; `None` if no stance was seen from its beginning to its end. `feet` has heel and toes of the right
 /// and the left foot in each frame, metres.
 pub fn belt(times_s: &[f64], phases: &[f64], feet: &[[[DVec3; 2]; 2]], ahead: DVec2) -> Option<Belt> {
     let mut speeds = Vec::new();

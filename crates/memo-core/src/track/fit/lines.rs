@@ -317,18 +317,17 @@ impl Figure {
     /// The lowest point of the lower foot: the heel, or the ball under the toes, and which it is.
     pub fn lowest_point(&self) -> (usize, DVec3) {
         let side = usize::from(self.posed.left.ankle.z < self.posed.right.ankle.z);
-        let [heel, ball] = self.sole(side);
+        let [heel, ball] = [-1.0, BALL].map(|share| self.sole(side, share));
         (side, if heel.z < ball.z { heel } else { ball })
     }
 
-    /// Heel and ball of a foot: the ends of its sole, the front one above the joints of the toes.
-    pub fn sole(&self, side: usize) -> [DVec3; 2] {
+    /// The point of a sole below a place on the foot's axis, from -1 at the heel to 1 at the tip of the toes.
+    pub fn sole(&self, side: usize, share: f64) -> DVec3 {
         let part = if side == 0 { Part::RightFoot } else { Part::LeftFoot };
         let foot = &self.posed.cylinders[part as usize];
         let axes = foot.world_from_cylinder.matrix3;
         let down = axes.x_axis * (-axes.x_axis.z.signum() * foot.semi_axes.x);
-        let end = |share: f64| foot.centre() + axes.z_axis * (share * foot.half_length) + down;
-        [end(-1.0), end(BALL)]
+        foot.centre() + axes.z_axis * (share * foot.half_length) + down
     }
 
     /// Derivatives by the figure of the height of a point under a foot.

@@ -80,7 +80,7 @@ impl Problem<'_> {
                 measured: self.measured(fitted, k),
                 sd: self.place_sd(fitted, k),
             };
-            (frame, [0, 1].map(|side| figure.sole(side)))
+            (frame, [0, 1].map(|side| [-1.0, 1.0].map(|end| figure.sole(side, end))))
         };
         let (mut all, mut feet): (Vec<FittedFrame>, Vec<_>) =
             (0..frames.len()).into_par_iter().map(frame).unzip();
