@@ -63,6 +63,11 @@ impl Candidate {
         self.seen.last().is_none_or(|last| same_person(&last.sighting.rectangle, rectangle))
     }
 
+    /// Where it was last seen.
+    pub fn last_rectangle(&self) -> Option<Rectangle> {
+        self.seen.last().map(|last| last.sighting.rectangle)
+    }
+
     /// Overlap of a rectangle with the last one, intersection over union.
     pub fn overlap(&self, rectangle: &Rectangle) -> f64 {
         let last = self.seen.last().map(|last| last.sighting.rectangle.sides(0.0));
@@ -261,7 +266,7 @@ pub(super) fn feet_cut_off(sightings: &[Sighting], height: usize) -> bool {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::super::fit::FitOptions;
     use super::super::score::EdgeLine;
     use super::super::search::tests::{camera, edges_of, walker};
@@ -306,7 +311,7 @@ mod tests {
     }
 
     /// Five sightings of a person at this speed, with the contours of a walker.
-    fn seen_walking(speed_mps: f64) -> Vec<Seen> {
+    pub fn seen_walking(speed_mps: f64) -> Vec<Seen> {
         seen_of(&walker(), speed_mps)
     }
 
