@@ -40,6 +40,8 @@ pub(super) struct Candidate {
     pub seen: Vec<Seen>,
     /// Frames without it since the last one.
     pub missed: usize,
+    /// Whether a start was refused.
+    pub refused: bool,
 }
 
 /// What a walk starts from.
@@ -61,6 +63,12 @@ impl Candidate {
     /// True if a rectangle may enclose the same thing as the last one.
     pub fn is_at(&self, rectangle: &Rectangle) -> bool {
         self.seen.last().is_none_or(|last| same_person(&last.sighting.rectangle, rectangle))
+    }
+
+    /// True if it was in the last frame and no start was refused: what was refused may be a part of somebody who is
+    /// followed.
+    pub fn may_start(&self) -> bool {
+        self.missed == 0 && !self.refused
     }
 
     /// Where it was last seen.
@@ -86,6 +94,7 @@ impl Candidate {
 
     /// Drops the oldest frames after a refused start.
     pub fn refuse(&mut self, options: &TrackerOptions) {
+        self.refused = true;
         self.seen.drain(..(options.start_frames / 3).min(self.seen.len()));
     }
 
@@ -359,7 +368,7 @@ pub(super) mod tests {
             height_m: Some(1.75),
             size: [640, 480],
         };
-        Candidate { seen, missed: 0 }.begin(&given).ok()
+        Candidate { seen, ..Candidate::default() }.begin(&given).ok()
     }
 
     /// A phone held upright sees the same as one held level, turned.

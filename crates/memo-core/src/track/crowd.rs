@@ -4,7 +4,8 @@
 //!
 //! * Nearer bodies hide farther ones in the hidden-line removal ([`Others`](crate::model::Others)).
 //! * An edge belongs to one person. A wholly visible person would otherwise drift onto the edges of somebody behind.
-//! * Somebody who comes near has edges too, from the first frame on and not only once there are enough frames to start.
+//! * Somebody who comes near has edges too, from the first frame on and not only once there are enough frames to start,
+//!   unless that start is refused.
 //! * Changes that the bodies explain start nobody.
 
 use super::decisions::{EXPLAINED, NEARER, OWNED, TURNED};

@@ -417,8 +417,9 @@ impl Tracker {
                 own,
                 &meeting.iter().map(|&other| &expected[other]).collect::<Vec<_>>(),
             );
-            // 3. Nor those of somebody who is about to be followed.
-            let beside = self.candidates.iter().filter(|candidate| candidate.is_in(&own.window));
+            // 3. Nor those of somebody who may start to be followed.
+            let may_start = |candidate: &&Candidate| candidate.may_start() && candidate.is_in(&own.window);
+            let beside = self.candidates.iter().filter(may_start);
             let newcomers: Vec<Rectangle> = beside.filter_map(Candidate::last_rectangle).collect();
             keep_known(&mut edges.edges, own, &newcomers);
             edges.shared = !meeting.is_empty() || !newcomers.is_empty();
@@ -555,7 +556,7 @@ impl Tracker {
             let nearest = known.max_by(|a, b| a.overlap(rectangle).total_cmp(&b.overlap(rectangle)));
             match nearest {
                 Some(candidate) => candidate.add(seen),
-                None => self.candidates.push(Candidate { seen: vec![seen], missed: 0 }),
+                None => self.candidates.push(Candidate { seen: vec![seen], ..Candidate::default() }),
             }
         }
         self.candidates.retain(|candidate| candidate.missed <= MISSED_FRAMES);

@@ -586,12 +586,22 @@ fn heights_are_those_of_people_in_order_of_appearance() {
 /// Two given heights, and the frames of somebody who walks.
 fn sought_with_heights() -> Tracker {
     let options = TrackerOptions { start_frames: 5, further_heights_m: vec![1.6], ..options() };
-    let candidate = Candidate { seen: seen_walking(1.3), missed: 0 };
+    let candidate = Candidate { seen: seen_walking(1.3), ..Candidate::default() };
     Tracker { candidates: vec![candidate], ..Tracker::new(options).unwrap() }
 }
 
 fn numbers_and_heights(tracker: &Tracker) -> Vec<(usize, BodyHeight)> {
     tracker.people.iter().map(|active| (active.person, active.height)).collect()
+}
+
+/// The model of somebody followed can be beside the person, who is then the candidate.
+#[test]
+fn a_candidate_has_edges_of_its_own_until_a_start_is_refused() {
+    let mut candidate = Candidate { seen: seen_walking(1.3), ..Candidate::default() };
+    assert!(candidate.may_start());
+    assert!(!Candidate { missed: 1, seen: seen_walking(1.3), ..Candidate::default() }.may_start());
+    candidate.refuse(&options());
+    assert!(!candidate.may_start());
 }
 
 #[test]
@@ -622,7 +632,7 @@ fn of_two_who_start_at_once_the_candidate_of_longer_standing_is_first() {
             edge.end[0] += 150.0;
         });
     }
-    tracker.candidates.push(Candidate { seen: later, missed: 0 });
+    tracker.candidates.push(Candidate { seen: later, ..Candidate::default() });
     tracker.start(&evidence(5, &[]));
     let places: Vec<f64> = tracker.people.iter().map(|active| active.sign_at(0).unwrap().place_m.x).collect();
     assert!(places.len() == 2 && places[0] + 1.0 < places[1], "{places:?}");
