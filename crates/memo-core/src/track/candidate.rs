@@ -40,6 +40,8 @@ pub(super) struct Candidate {
     pub seen: Vec<Seen>,
     /// Frames without it since the last one.
     pub missed: usize,
+    /// Whether a start was refused.
+    pub refused: bool,
 }
 
 /// What a walk starts from.
@@ -63,6 +65,17 @@ impl Candidate {
         self.seen.last().is_none_or(|last| same_person(&last.sighting.rectangle, rectangle))
     }
 
+    /// True if it was in the last frame and no start was refused: what was refused may be a part of somebody who is
+    /// followed.
+    pub fn may_start(&self) -> bool {
+        self.missed == 0 && !self.refused
+    }
+
+    /// Where it was last seen.
+    pub fn last_rectangle(&self) -> Option<Rectangle> {
+        self.seen.last().map(|last| last.sighting.rectangle)
+    }
+
     /// Overlap of a rectangle with the last one, intersection over union.
     pub fn overlap(&self, rectangle: &Rectangle) -> f64 {
         let last = self.seen.last().map(|last| last.sighting.rectangle.sides(0.0));
@@ -81,6 +94,7 @@ impl Candidate {
 
     /// Drops the oldest frames after a refused start.
     pub fn refuse(&mut self, options: &TrackerOptions) {
+        self.refused = true;
         self.seen.drain(..(options.start_frames / 3).min(self.seen.len()));
     }
 
@@ -261,7 +275,7 @@ pub(super) fn feet_cut_off(sightings: &[Sighting], height: usize) -> bool {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::super::fit::FitOptions;
     use super::super::score::EdgeLine;
     use super::super::search::tests::{camera, edges_of, walker};
@@ -306,7 +320,7 @@ mod tests {
     }
 
     /// Five sightings of a person at this speed, with the contours of a walker.
-    fn seen_walking(speed_mps: f64) -> Vec<Seen> {
+    pub fn seen_walking(speed_mps: f64) -> Vec<Seen> {
         seen_of(&walker(), speed_mps)
     }
 
@@ -354,7 +368,7 @@ mod tests {
             height_m: Some(1.75),
             size: [640, 480],
         };
-        Candidate { seen, missed: 0 }.begin(&given).ok()
+        Candidate { seen, ..Candidate::default() }.begin(&given).ok()
     }
 
     /// A phone held upright sees the same as one held level, turned.

@@ -58,20 +58,30 @@ impl Identities {
 
     /// The person who ended nearest to where this walk starts, or a new one.
     pub fn appear(&mut self, sign: &Sign) -> usize {
-        self.ended.retain(|(_, end)| sign.time_s - end.time_s <= end.expected_s());
-        let nearest = |(n, (_, end)): (usize, &(usize, Sign))| Some((n, end.distance_to(sign)?));
-        let known = self.ended.iter().enumerate().filter_map(nearest).min_by(|a, b| a.1.total_cmp(&b.1));
-        match known {
-            Some((n, _)) => self.ended.swap_remove(n).0,
-            None => {
-                self.count += 1;
-                self.count - 1
-            }
-        }
+        let Some(person) = self.known(sign) else {
+            self.count += 1;
+            return self.count - 1;
+        };
+        self.is_back(person);
+        person
+    }
+
+    /// The person who ended nearest to where this walk starts, of those who are expected back.
+    pub fn known(&self, sign: &Sign) -> Option<usize> {
+        let expected = self.ended.iter().filter(|(_, end)| end.is_expected(sign.time_s));
+        let nearest = expected.filter_map(|(person, end)| Some((*person, end.distance_to(sign)?)));
+        nearest.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(person, _)| person)
+    }
+
+    /// Everybody who is expected back at a time.
+    pub fn expected(&self, time_s: f64) -> impl Iterator<Item = usize> {
+        let expected = self.ended.iter().filter(move |(_, end)| end.is_expected(time_s));
+        expected.map(|(person, _)| *person)
     }
 
     /// Notes the end of a person's walk.
     pub fn end(&mut self, person: usize, sign: Sign) {
+        self.ended.retain(|(_, end)| end.is_expected(sign.time_s));
         self.ended.push((person, sign));
     }
 
@@ -114,9 +124,9 @@ impl Sign {
         is_same.then_some(off_m)
     }
 
-    /// How long the person is expected back, seconds.
-    fn expected_s(&self) -> f64 {
-        if self.stands { STANDS_S } else { EXPECTED_S }
+    /// True if the person is expected back at a time.
+    fn is_expected(&self, time_s: f64) -> bool {
+        time_s - self.time_s <= if self.stands { STANDS_S } else { EXPECTED_S }
     }
 }
 

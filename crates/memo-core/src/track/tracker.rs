@@ -29,7 +29,7 @@ mod unfollowed;
 
 use super::active::Active;
 use super::candidate::{Candidate, Given, MISSED_FRAMES, Seen};
-use super::crowd::{Expected, body_box, clear_explained, expected, keep_own, keep_unowned};
+use super::crowd::{Expected, body_box, clear_explained, expected, keep_known, keep_own, keep_unowned};
 use super::decisions::{OUTSIDE_SHARE, SAME_PLACE_M};
 use super::evidence::{Evidence, EvidenceError, EvidenceOptions, EvidenceStream};
 use super::fit::FitError;
@@ -417,9 +417,14 @@ impl Tracker {
                 own,
                 &meeting.iter().map(|&other| &expected[other]).collect::<Vec<_>>(),
             );
-            edges.shared = !meeting.is_empty();
+            // 3. Nor those of somebody who may start to be followed.
+            let may_start = |candidate: &&Candidate| candidate.may_start() && candidate.is_in(&own.window);
+            let beside = self.candidates.iter().filter(may_start);
+            let newcomers: Vec<Rectangle> = beside.filter_map(Candidate::last_rectangle).collect();
+            keep_known(&mut edges.edges, own, &newcomers);
+            edges.shared = !meeting.is_empty() || !newcomers.is_empty();
             edges.others.clone_from(&others);
-            // 3. A rectangle that nobody else is in.
+            // 4. A rectangle that nobody else is in.
             let overlaps = |region: &&Rectangle| region.gap(&own.window) == [0, 0];
             let region = if meeting.is_empty() { regions.iter().find(overlaps) } else { None };
             let sighting = region.and_then(|region| whole(region, evidence));
@@ -476,17 +481,40 @@ impl Tracker {
     /// where that person was is the same person, whose first walk ends there.
     fn identified(&mut self, new: &Active) -> usize {
         let Some(start) = new.sign_at(0) else { return self.identities.count() };
-        // The old walk may have gone on for some frames while the person turned round.
-        let stood = |end: Sign| Sign { time_s: end.time_s.min(start.time_s), ..end };
-        let end = |old: &Active| old.standing().map(stood).or_else(|| old.sign_before(start.time_s));
-        let leads = |(_, old): &(f64, Active)| end(old).is_some_and(|end| end.leads_to(&start));
-        let Some(n) = self.fading.iter().position(leads) else { return self.identities.appear(&start) };
+        let Some(n) = self.faded(&start) else { return self.identities.appear(&start) };
         let (_, mut old) = self.fading.remove(n);
         old.end_before(start.time_s);
         let person = old.person;
         self.end_walk(old);
         self.identities.is_back(person);
         person
+    }
+
+    /// Which of the walks that are over leads to a start.
+    fn faded(&self, start: &Sign) -> Option<usize> {
+        // The old walk may have gone on for some frames while the person turned round.
+        let stood = |end: Sign| Sign { time_s: end.time_s.min(start.time_s), ..end };
+        let end = |old: &Active| old.standing().map(stood).or_else(|| old.sign_before(start.time_s));
+        self.fading.iter().position(|(_, old)| end(old).is_some_and(|end| end.leads_to(start)))
+    }
+
+    /// True if a walk would get the number of this person, whose walk is over.
+    fn is_back(&self, person: usize, new: &Active) -> bool {
+        let Some(start) = new.sign_at(0) else { return false };
+        let known = self.faded(&start).map(|n| self.fading[n].1.person);
+        known.or_else(|| self.identities.known(&start)) == Some(person)
+    }
+
+    /// People who may be back, and whose given heights are not that of the next person.
+    fn of_other_height(&self, time_s: f64) -> Vec<usize> {
+        let height_m = |person: usize| self.options.height_of(person);
+        let next_m = height_m(self.identities.count());
+        let fading = self.fading.iter().map(|(_, old)| old.person);
+        let mut people: Vec<usize> = fading.chain(self.identities.expected(time_s)).collect();
+        people.retain(|&person| height_m(person) != next_m);
+        people.sort_unstable();
+        people.dedup();
+        people
     }
 
     /// Adds the regions that nobody explains to the candidates, and starts those that walk.
@@ -528,7 +556,7 @@ impl Tracker {
             let nearest = known.max_by(|a, b| a.overlap(rectangle).total_cmp(&b.overlap(rectangle)));
             match nearest {
                 Some(candidate) => candidate.add(seen),
-                None => self.candidates.push(Candidate { seen: vec![seen], missed: 0 }),
+                None => self.candidates.push(Candidate { seen: vec![seen], ..Candidate::default() }),
             }
         }
         self.candidates.retain(|candidate| candidate.missed <= MISSED_FRAMES);
@@ -612,24 +640,20 @@ impl Tracker {
         borrowed.map_or(0.0, |active| active.height.relative_sd().max(active.height.scale_sd))
     }
 
-    /// Starts walks on candidates that have enough frames, or drops their oldest ones.
+    /// Starts walks on candidates that have enough frames, in order of appearance, or drops their oldest ones.
     fn start(&mut self, evidence: &Evidence) {
         let size = [evidence.grey.width() as u32, evidence.grey.height() as u32];
-        for n in (0..self.candidates.len()).rev() {
-            let candidate = &self.candidates[n];
-            if candidate.seen.len() < self.frames_to_start(candidate) || candidate.missed > 0 {
+        for mut candidate in std::mem::take(&mut self.candidates) {
+            if candidate.seen.len() < self.frames_to_start(&candidate) || candidate.missed > 0 {
+                self.candidates.push(candidate);
                 continue;
             }
-            let height_m = self.options.height_of(self.identities.count());
-            let (options, camera, tilt) = (&self.options, self.camera(), self.tilt);
-            let given = Given { options, camera, tilt, scale_sd: self.scale_sd(), height_m, size };
-            let begun = candidate.begin(&given).and_then(|active| {
+            let begun = self.begun(&candidate, size).and_then(|active| {
                 let is_own = self.is_somebody_else(&active) && !self.is_left_over(&active);
                 if is_own { Ok(active) } else { Err(Reason::Beside) }
             });
             match begun {
                 Ok(mut active) => {
-                    self.candidates.remove(n);
                     active.person = self.identified(&active);
                     active.started_near = !self.people.is_empty();
                     self.started.insert(active.person, evidence.frame);
@@ -637,12 +661,27 @@ impl Tracker {
                 }
                 Err(reason) => {
                     self.report.refused_starts += 1;
-                    let last = self.candidates[n].seen.last().map(|seen| seen.sighting.rectangle);
+                    let last = candidate.last_rectangle();
                     last.iter().for_each(|r| self.unfollowed.refuse(evidence.frame, r, reason));
-                    self.candidates[n].refuse(&self.options);
+                    candidate.refuse(&self.options);
+                    self.candidates.push(candidate);
                 }
             }
         }
+    }
+
+    /// The walk of a candidate, with the height of its person: of somebody who is expected back and is back with it, or
+    /// of the next one.
+    fn begun(&self, candidate: &Candidate, size: [u32; 2]) -> Result<Active, Reason> {
+        let begin = |person: usize| {
+            let (options, camera, tilt) = (&self.options, self.camera(), self.tilt);
+            let (scale_sd, height_m) = (self.scale_sd(), options.height_of(person));
+            candidate.begin(&Given { options, camera, tilt, scale_sd, height_m, size })
+        };
+        let is_back = |person: usize| begin(person).ok().filter(|active| self.is_back(person, active));
+        let time_s = candidate.seen.first().map_or(0.0, |seen| seen.edges.time_s);
+        let back = self.of_other_height(time_s).into_iter().find_map(is_back);
+        back.map_or_else(|| begin(self.identities.count()), Ok)
     }
 
     /// Somebody beside a followed person is soon hidden or mistaken for that person, so half as many frames must do.

@@ -39,8 +39,9 @@ impl Tracker {
         }
         let size = [evidence.grey.width() as u32, evidence.grey.height() as u32];
         let standing = std::mem::take(&mut self.standing);
-        let begun = self.begun_where_it_stays(standing, size);
-        match begun.or_else(|standing| self.begun_along_the_sight(standing, size)) {
+        let next = self.identities.count();
+        let begun = self.begun_where_it_stays(standing, size, next);
+        match begun.or_else(|standing| self.begun_along_the_sight(standing, size, next)) {
             Ok(mut active) => {
                 self.candidates.clear();
                 active.person = self.identified(&active);
@@ -52,18 +53,28 @@ impl Tracker {
         }
     }
 
-    fn begun_where_it_stays(&self, standing: Standing, size: [u32; 2]) -> Result<Active, Standing> {
+    fn begun_where_it_stays(
+        &self,
+        standing: Standing,
+        size: [u32; 2],
+        person: usize,
+    ) -> Result<Active, Standing> {
         if self.options.treadmill == Some(false) {
             return Err(standing);
         }
-        match self.spot(&standing.sightings(), size) {
+        match self.spot(&standing.sightings(), size, person) {
             Some(spot) => spot.begin(standing),
             None => Err(standing),
         }
     }
 
     /// Only a calibrated camera shows how far away feet are.
-    fn begun_along_the_sight(&self, standing: Standing, size: [u32; 2]) -> Result<Active, Standing> {
+    fn begun_along_the_sight(
+        &self,
+        standing: Standing,
+        size: [u32; 2],
+        person: usize,
+    ) -> Result<Active, Standing> {
         let (options, sightings) = (&self.options, standing.sightings());
         let Some(camera) = options.camera.as_ref().filter(|_| options.treadmill != Some(true)) else {
             return Err(standing);
@@ -71,21 +82,20 @@ impl Tracker {
         if feet_cut_off(&sightings, size[1] as usize) || standing.lasts_s() < SHORTEST_S {
             return Err(standing);
         }
-        let height =
-            approaching_height(options, options.height_of(self.identities.count()), camera, &sightings);
+        let height = approaching_height(options, options.height_of(person), camera, &sightings);
         match options.walker(height.height_m, COMFORTABLE_MPS) {
             Ok(walker) => Approach { camera, height, walker, options }.begin(standing),
             Err(_) => Err(standing),
         }
     }
 
-    /// What a start on the spot needs.
-    fn spot(&self, sightings: &[Sighting], size: [u32; 2]) -> Option<Spot<'_>> {
+    /// What a start of a person on the spot needs.
+    pub(super) fn spot(&self, sightings: &[Sighting], size: [u32; 2], person: usize) -> Option<Spot<'_>> {
         if feet_cut_off(sightings, size[1] as usize) {
             return None;
         }
         let (options, camera) = (&self.options, self.options.camera.as_ref());
-        let height_m = options.height_of(self.identities.count());
+        let height_m = options.height_of(person);
         let height = start_height(options, height_m, camera, sightings);
         let walker = options.walker(height.height_m, COMFORTABLE_MPS).ok()?;
         let given = Given { options, camera, tilt: self.tilt, scale_sd: 0.0, height_m, size };
@@ -103,7 +113,7 @@ impl Tracker {
             return active;
         }
         let person = active.person;
-        match self.spot(&standing.sightings(), active.camera.size).map(|spot| spot.begin(standing)) {
+        match self.spot(&standing.sightings(), active.camera.size, person).map(|spot| spot.begin(standing)) {
             Some(Ok(on_the_spot)) => Active { person, ..on_the_spot },
             _ => active,
         }

@@ -1,6 +1,8 @@
 //! Decisions of the tracker, on moving boxes and on walks put into it; no frame is drawn.
 
-use super::super::search::tests::{camera, walker};
+use super::super::candidate::tests::seen_walking;
+use super::super::height::BodyHeight;
+use super::super::search::tests::{camera, rectangle_of, walker};
 use super::super::search::{Axis, Hypothesis, Path, Scene};
 use super::super::start::Direction;
 use super::super::start::tests::report;
@@ -579,4 +581,76 @@ fn heights_are_those_of_people_in_order_of_appearance() {
     options.further_heights_m.push(18.0);
     let refused = Tracker::new(options).unwrap_err();
     assert!(matches!(refused, TrackError::Body(_)) && refused.to_string().contains("18"), "{refused}");
+}
+
+/// Two given heights, and the frames of somebody who walks.
+fn sought_with_heights() -> Tracker {
+    let options = TrackerOptions { start_frames: 5, further_heights_m: vec![1.6], ..options() };
+    let candidate = Candidate { seen: seen_walking(1.3), ..Candidate::default() };
+    Tracker { candidates: vec![candidate], ..Tracker::new(options).unwrap() }
+}
+
+fn numbers_and_heights(tracker: &Tracker) -> Vec<(usize, BodyHeight)> {
+    tracker.people.iter().map(|active| (active.person, active.height)).collect()
+}
+
+/// The model of somebody followed can be beside the person, who is then the candidate.
+#[test]
+fn a_candidate_has_edges_of_its_own_until_a_start_is_refused() {
+    let mut candidate = Candidate { seen: seen_walking(1.3), ..Candidate::default() };
+    assert!(candidate.may_start());
+    assert!(!Candidate { missed: 1, seen: seen_walking(1.3), ..Candidate::default() }.may_start());
+    candidate.refuse(&options());
+    assert!(!candidate.may_start());
+}
+
+#[test]
+fn who_is_back_has_the_height_of_before() {
+    let [first, second] = [(0, BodyHeight::given(1.75)), (1, BodyHeight::given(1.6))];
+    let mut tracker = sought_with_heights();
+    tracker.start(&evidence(5, &[]));
+    assert_eq!(numbers_and_heights(&tracker), [first]);
+    let ended = tracker.people.remove(0).sign_at(0).unwrap();
+    for (time_s, expected) in [(ended.time_s, first), (ended.time_s - 9.0, second)] {
+        let mut tracker = Tracker { identities: Identities::default(), ..sought_with_heights() };
+        tracker.identities.appear(&ended);
+        tracker.identities.end(0, Sign { time_s, ..ended });
+        tracker.start(&evidence(5, &[]));
+        assert_eq!(numbers_and_heights(&tracker), [expected], "ended at {time_s} s");
+    }
+}
+
+#[test]
+fn of_two_who_start_at_once_the_candidate_of_longer_standing_is_first() {
+    let mut tracker = sought_with_heights();
+    let mut later = seen_walking(1.3);
+    for seen in &mut later {
+        let moved = &mut seen.sighting.rectangle;
+        (moved.left, moved.right) = (moved.left + 150, moved.right + 150);
+        seen.edges.edges.iter_mut().for_each(|edge| {
+            edge.start[0] += 150.0;
+            edge.end[0] += 150.0;
+        });
+    }
+    tracker.candidates.push(Candidate { seen: later, ..Candidate::default() });
+    tracker.start(&evidence(5, &[]));
+    let places: Vec<f64> = tracker.people.iter().map(|active| active.sign_at(0).unwrap().place_m.x).collect();
+    assert!(places.len() == 2 && places[0] + 1.0 < places[1], "{places:?}");
+    assert_eq!(tracker.people[0].height, BodyHeight::given(1.75));
+    assert_eq!(tracker.people[1].height, BodyHeight::given(1.6));
+}
+
+/// Who began as somebody who walks slowly is the same person on the spot.
+#[test]
+fn who_begins_again_on_the_spot_keeps_the_height() {
+    let tracker = sought_with_heights();
+    let sighting = |k: u32| {
+        let rectangle = rectangle_of(&walker(), &camera(), &PATH, 0.01 * f64::from(k % 3));
+        Sighting { time_s: 0.04 * f64::from(k), rectangle }
+    };
+    let sightings: Vec<Sighting> = (0..40).map(sighting).collect();
+    for (who, height_m) in [(0, 1.75), (1, 1.6)] {
+        let spot = tracker.spot(&sightings, [SIZE[0] as u32, SIZE[1] as u32], who).unwrap();
+        assert_eq!(spot.height, BodyHeight::given(height_m));
+    }
 }
