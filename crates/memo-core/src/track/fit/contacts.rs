@@ -121,7 +121,7 @@ mod tests {
 
     #[test]
     fn contacts_are_where_the_feet_begin_and_end_to_stand() {
-        let times_s: Vec<f64> = (0..150).map(|k| 0.02 * f64::from(k) + 0.003).collect();
+        let times_s: Vec<f64> = (0..300).map(|k| 0.01 * f64::from(k) + 0.003).collect();
         let phases: Vec<f64> = times_s.iter().map(|t| t + 0.03).collect();
         let all: Vec<_> = times_s.iter().map(|&t| feet(t)).collect();
         let ahead = vec![DVec2::X; times_s.len()];
