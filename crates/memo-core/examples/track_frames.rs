@@ -124,7 +124,9 @@ mod tests {
         let [walk] = walks.as_slice() else { return Err(format!("{} walks", walks.len()).into()) };
         for row in walk.rows() {
             let truth = scene.truth(row.frame).ok_or("the walker is there")?;
-            assert!(row.torso_centre.distance(truth.posed.torso_centre) < 0.1);
+            // Across the path memo expects a pelvis that sways, and the drawn model's does not.
+            let off = row.torso_centre - truth.posed.torso_centre;
+            assert!(off.x.abs() < 0.05 && off.y.abs() < 0.15 && off.z.abs() < 0.05, "{off}");
             assert_eq!(csv_row(&row, walk).split(',').count(), header().split(',').count());
         }
         Ok(())

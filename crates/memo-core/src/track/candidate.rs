@@ -22,6 +22,9 @@ pub(super) const MISSED_FRAMES: usize = 3;
 pub(super) const COMFORTABLE_MPS: f64 = 1.3;
 /// A glance at a start looks at every such frame.
 const GLANCE_EVERY: usize = 3;
+/// A rectangle near somebody else that is lower than this share of the tallest one shows no feet. Strides and arms change
+/// the height of a whole person's by a few percent; in a drawn pair, whose nearer walker hid the other's feet, it was 0.84.
+const WHOLE_SHARE: f64 = 0.9;
 /// Gaits other than the average with which a walk can start.
 const OTHER_GAITS: [GaitStyle; 2] = [GaitStyle::CROUCHED, GaitStyle::SHORT_STEPS];
 
@@ -106,10 +109,11 @@ impl Candidate {
     /// 3. Both twins followed through the start frames.
     pub fn begin(&self, given: &Given<'_>) -> Result<Active, Reason> {
         let options = given.options;
-        let sightings: Vec<Sighting> = self.seen.iter().map(|seen| seen.sighting).collect();
+        let sightings = self.sightings();
         if feet_cut_off(&sightings, given.size[1] as usize) {
             return Err(Reason::CutOff);
         }
+        let sightings = self.with_hidden_feet(sightings);
         let height = start_height(options, given.height_m, given.camera, &sightings).on_scale(given.scale_sd);
         if options.treadmill == Some(true) {
             let Entered { course, .. } = Entered::new(&sightings, given, &height, &GaitStyle::default())?;
@@ -138,6 +142,25 @@ impl Candidate {
             early: None,
             pieces: self.seen.iter().filter_map(|seen| seen.piece.clone()).collect(),
         })
+    }
+
+    fn sightings(&self) -> Vec<Sighting> {
+        self.seen.iter().map(|seen| seen.sighting).collect()
+    }
+
+    /// The sightings with the lowest row of the tallest one where somebody nearer may hide the feet: what ends above them
+    /// would seem to stand farther away.
+    fn with_hidden_feet(&self, mut sightings: Vec<Sighting>) -> Vec<Sighting> {
+        let Some(tallest) = sightings.iter().map(|s| s.rectangle).max_by_key(Rectangle::height) else {
+            return sightings;
+        };
+        for (sighting, seen) in sightings.iter_mut().zip(&self.seen) {
+            let is_short = (sighting.rectangle.height() as f64) < WHOLE_SHARE * tallest.height() as f64;
+            if seen.edges.shared && is_short {
+                sighting.rectangle.bottom = tallest.bottom;
+            }
+        }
+        sightings
     }
 
     /// The gait with which a walk starts, or why none does.
@@ -407,6 +430,23 @@ pub(super) mod tests {
         let crown = Crown { height_m: walker().level_crown_height_m(), sd_m: 0.02 };
         let course = locate(&sightings, &camera(), &crown).unwrap();
         assert_eq!((active.depth_sd_m, active.gait_speed_mps), (course.depth_sd_m, course.speed_mps));
+    }
+
+    #[test]
+    fn feet_that_somebody_nearer_hides_move_nobody_farther_away() {
+        let whole = begun(seen_walking(1.3)).expect("a walker");
+        let depth_m = |is_shared: bool| {
+            let mut seen = seen_walking(1.3);
+            for seen in &mut seen[2..] {
+                seen.sighting.rectangle.bottom -= seen.sighting.rectangle.height() / 6;
+                seen.edges.shared = is_shared;
+            }
+            begun(seen).map(|active| active.start.path.point(0.0, 0.0).distance(active.camera.position()))
+        };
+        let whole_m = whole.start.path.point(0.0, 0.0).distance(whole.camera.position());
+        let hidden_m = depth_m(true).expect("a walker");
+        assert!((hidden_m - whole_m).abs() < 0.05, "{hidden_m} {whole_m}");
+        assert!(depth_m(false).is_none_or(|cut_m| cut_m > whole_m + 0.3), "nobody hid them");
     }
 
     #[test]
