@@ -52,33 +52,3 @@ def test_everybody_in_a_frame_is_explained(run):
         assert np.linalg.norm(middle_px - hips_px) < 40
     page = write_report(run, frames=(chosen[0], chosen[0] + 3)).path.read_text(encoding="utf-8")
     assert "Walk 2 (person 2): value" in page and "Heel strikes and toe-offs of person 2" in page
-
-
-def test_who_comes_near_somebody_followed_does_not_draw_the_model_away(tmp_path):
-    """One overtakes another, a third comes the other way; their heights in order of appearance."""
-    scene = SHARED_DATA / "people" / "three"
-    if not scene.is_dir():
-        pytest.skip(f"no scene in {scene} (set MEMO_SHARED_DATA)")
-    given = [scene / "video.mp4", "--camera", scene / "camera.toml", "--height", "1.62,1.66,1.86"]
-    ran("track", *given, "--no-overlay", "--no-plots", "--quiet", "--out", tmp_path)
-    track = read_track_csv(tmp_path / "track.csv")
-    assert sorted(set(track["person"].tolist())) == [0, 1, 2]
-    for person, truth, height_m in ((0, 0, 1.62), (1, 2, 1.66), (2, 1, 1.86)):
-        rows = track["person"] == person
-        steps = np.diff(track["phase"][rows]) % 1
-        assert steps.max() < 0.1, "the phase goes on in every frame"
-        places_m = true_places(scene / f"truth_{truth}.csv")
-        off_m = [
-            np.hypot(*(np.array([x, y]) - places_m[int(frame)]))
-            for frame, x, y in zip(track["frame"][rows], track["x_m"][rows], track["y_m"][rows], strict=True)
-            if int(frame) in places_m
-        ]
-        assert len(off_m) >= 0.9 * len(places_m) and np.median(off_m) < 0.15, (height_m, np.median(off_m))
-
-
-def true_places(path):
-    """The place of the trunk on the ground in each frame."""
-    rows = np.genfromtxt(path, delimiter=",", names=True)
-    trunk = ("RSH", "LSH", "RHP", "LHP")
-    x, y = (sum(rows[f"{joint}_{axis}_m"] for joint in trunk) / len(trunk) for axis in "xy")
-    return {int(frame): np.array(place) for frame, *place in zip(rows["frame"], x, y, strict=True)}

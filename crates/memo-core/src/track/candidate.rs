@@ -43,8 +43,6 @@ pub(super) struct Candidate {
     pub seen: Vec<Seen>,
     /// Frames without it since the last one.
     pub missed: usize,
-    /// Whether a start was refused.
-    pub refused: bool,
 }
 
 /// What a walk starts from.
@@ -66,12 +64,6 @@ impl Candidate {
     /// True if a rectangle may enclose the same thing as the last one.
     pub fn is_at(&self, rectangle: &Rectangle) -> bool {
         self.seen.last().is_none_or(|last| same_person(&last.sighting.rectangle, rectangle))
-    }
-
-    /// True if it was in the last frame and no start was refused: what was refused may be a part of somebody who is
-    /// followed.
-    pub fn may_start(&self) -> bool {
-        self.missed == 0 && !self.refused
     }
 
     /// Where it was last seen.
@@ -97,7 +89,6 @@ impl Candidate {
 
     /// Drops the oldest frames after a refused start.
     pub fn refuse(&mut self, options: &TrackerOptions) {
-        self.refused = true;
         self.seen.drain(..(options.start_frames / 3).min(self.seen.len()));
     }
 

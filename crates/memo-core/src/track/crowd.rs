@@ -1,18 +1,16 @@
 //! Several people in one frame: where each is expected, whose edges are whose, and what nobody explains.
 //!
-//! People are followed side by side, each with filters and searches of their own. Four things keep them apart:
+//! People are followed side by side, each with filters and searches of their own. Three things keep them apart:
 //!
 //! * Nearer bodies hide farther ones in the hidden-line removal ([`Others`](crate::model::Others)).
 //! * An edge belongs to one person. A wholly visible person would otherwise drift onto the edges of somebody behind.
-//! * Somebody who comes near has edges too, from the first frame on and not only once there are enough frames to start,
-//!   unless that start is refused.
 //! * Changes that the bodies explain start nobody.
 
 use super::decisions::{EXPLAINED, NEARER, OWNED, TURNED};
 use super::score::{EdgeLine, ModelLine};
 use super::search::Scene;
 use super::walk::State;
-use crate::image::{Mask, Rectangle, Sides};
+use crate::image::{Mask, Rectangle};
 use crate::model::body::PART_COUNT;
 use crate::model::{Camera, EllipticCylinder};
 use glam::{DVec2, Vec2};
@@ -68,22 +66,6 @@ pub(super) fn keep_own(edges: &mut Vec<EdgeLine>, own: &Expected, others: &[&Exp
             of_other < OWNED && of_other + NEARER <= cost
         })
     });
-}
-
-/// Removes the edges that may belong to somebody who is not followed yet: those in the rectangle of such a newcomer that
-/// are not the person's own.
-pub(super) fn keep_known(edges: &mut Vec<EdgeLine>, own: &Expected, newcomers: &[Rectangle]) {
-    if newcomers.is_empty() {
-        return;
-    }
-    edges.retain(|edge| own.cost(edge) < OWNED || !newcomers.iter().any(|rectangle| holds(rectangle, edge)));
-}
-
-/// True if the middle of an edge is in a rectangle.
-fn holds(rectangle: &Rectangle, edge: &EdgeLine) -> bool {
-    let [x, y] = [0, 1].map(|k| f64::from(0.5 * (edge.start[k] + edge.end[k])));
-    let Sides { left, top, right, bottom } = rectangle.sides(0.0);
-    (left..=right).contains(&x) && (top..=bottom).contains(&y)
 }
 
 /// Removes the edges of people who are followed.
@@ -217,19 +199,6 @@ mod tests {
         let mut alone = vec![upright(500.0)];
         keep_own(&mut alone, &person(300.0), &[]);
         assert_eq!(alone.len(), 1, "without others every edge stays");
-    }
-
-    #[test]
-    fn an_edge_in_the_rectangle_of_a_newcomer_is_not_known_to_be_one_s_own() {
-        let newcomer = Rectangle { left: 310, top: 80, right: 360, bottom: 220 };
-        let upright = |x: f32| edge([x, 110.0], [x, 190.0]);
-        let kept = |newcomers: &[Rectangle]| {
-            let mut edges = [250.0, 300.0, 304.0, 312.0, 330.0, 380.0].map(upright).to_vec();
-            keep_known(&mut edges, &person(305.0), newcomers);
-            edges.iter().map(|edge| edge.start[0]).collect::<Vec<_>>()
-        };
-        assert_eq!(kept(&[newcomer]), [250.0, 300.0, 304.0, 312.0, 380.0], "what is near stays");
-        assert_eq!(kept(&[]).len(), 6, "without newcomers every edge stays");
     }
 
     #[test]

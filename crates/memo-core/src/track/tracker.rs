@@ -29,7 +29,7 @@ mod unfollowed;
 
 use super::active::Active;
 use super::candidate::{Candidate, Given, MISSED_FRAMES, Seen};
-use super::crowd::{Expected, body_box, clear_explained, expected, keep_known, keep_own, keep_unowned};
+use super::crowd::{Expected, body_box, clear_explained, expected, keep_own, keep_unowned};
 use super::decisions::{OUTSIDE_SHARE, SAME_PLACE_M};
 use super::evidence::{Evidence, EvidenceError, EvidenceOptions, EvidenceStream};
 use super::fit::FitError;
@@ -417,14 +417,9 @@ impl Tracker {
                 own,
                 &meeting.iter().map(|&other| &expected[other]).collect::<Vec<_>>(),
             );
-            // 3. Nor those of somebody who may start to be followed.
-            let may_start = |candidate: &&Candidate| candidate.may_start() && candidate.is_in(&own.window);
-            let beside = self.candidates.iter().filter(may_start);
-            let newcomers: Vec<Rectangle> = beside.filter_map(Candidate::last_rectangle).collect();
-            keep_known(&mut edges.edges, own, &newcomers);
-            edges.shared = !meeting.is_empty() || !newcomers.is_empty();
+            edges.shared = !meeting.is_empty();
             edges.others.clone_from(&others);
-            // 4. A rectangle that nobody else is in.
+            // 3. A rectangle that nobody else is in.
             let overlaps = |region: &&Rectangle| region.gap(&own.window) == [0, 0];
             let region = if meeting.is_empty() { regions.iter().find(overlaps) } else { None };
             let sighting = region.and_then(|region| whole(region, evidence));

@@ -594,16 +594,6 @@ fn numbers_and_heights(tracker: &Tracker) -> Vec<(usize, BodyHeight)> {
     tracker.people.iter().map(|active| (active.person, active.height)).collect()
 }
 
-/// The model of somebody followed can be beside the person, who is then the candidate.
-#[test]
-fn a_candidate_has_edges_of_its_own_until_a_start_is_refused() {
-    let mut candidate = Candidate { seen: seen_walking(1.3), ..Candidate::default() };
-    assert!(candidate.may_start());
-    assert!(!Candidate { missed: 1, seen: seen_walking(1.3), ..Candidate::default() }.may_start());
-    candidate.refuse(&options());
-    assert!(!candidate.may_start());
-}
-
 #[test]
 fn who_is_back_has_the_height_of_before() {
     let [first, second] = [(0, BodyHeight::given(1.75)), (1, BodyHeight::given(1.6))];
