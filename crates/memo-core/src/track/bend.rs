@@ -2,8 +2,9 @@
 //!
 //! 1. The rectangles are smoothed to a curve on the ground ([`Trail`]).
 //! 2. The curve is taken instead of the route so far if the contours of the latest frames are more similar on it.
-//! 3. Along the line of sight, contours tell less: the curve is taken of somebody followed by the feet, and of somebody
-//!    whose walk would be over, if the rectangles are more likely on it than on a line.
+//! 3. Along the line of sight, contours tell less. Rectangles turn clearly if a curve explains them better than a straight
+//!    path on which the person may slow down, stop or set off. Then the curve is taken of somebody followed by the feet if the
+//!    contours are not less similar on it, and of somebody whose walk would be over if contours and feet together are likelier.
 //!
 //! While somebody is followed, the latest frames show the turn from one side only. So when the walk is over, the whole
 //! route of a person who turned is smoothed again.
@@ -83,14 +84,13 @@ impl Active {
         if self.walk.route.is_straight() && kept <= 2 * window { 0 } else { kept.saturating_sub(window) }
     }
 
-    /// The relative gain of similarity that a curve needs. Rectangles that turn clearly need less of somebody followed by
-    /// the feet, as contours tell less, and none where the walk would be over.
-    fn least_gain(&self, when: When, is_clear: bool) -> Option<f64> {
+    /// The relative gain of similarity that a curve needs: none of somebody followed by the feet whose rectangles turn
+    /// clearly, as contours tell less.
+    fn least_gain(&self, when: When, is_clear: bool) -> f64 {
         match when {
-            When::Over if is_clear => None,
-            _ if is_clear && self.is_frontal() => Some(0.0),
-            When::BesideOthers if !self.settled => Some(EARLY_TURN_GAIN),
-            _ => Some(TURN_GAIN),
+            _ if is_clear && self.is_frontal() => 0.0,
+            When::BesideOthers if !self.settled => EARLY_TURN_GAIN,
+            _ => TURN_GAIN,
         }
     }
 
@@ -119,7 +119,6 @@ impl Active {
         let trail = Trail::new(&anchors, &sightings, &self.camera, &self.crown());
         let Some(curved) = route.continued(&trail.curve(jerk_sd), along_m) else { return false };
         let is_clear = trail.turn_gain() > CLEAR_TURN;
-        let least_gain = self.least_gain(when, is_clear);
         // 2. A quick look whether it can be better.
         let frames = || self.steps()[before..].iter().zip(&kept).step_by(QUICK_EVERY);
         let quick = |new: &Route| -> f64 {
@@ -136,10 +135,12 @@ impl Active {
             let steps = &walk.twins[walk.best()].steps;
             steps[before..].iter().map(|step| f64::from(step.similarity * step.visible)).sum()
         };
-        let is_better = match least_gain {
-            _ if when == When::Ended => self.log_odds_of(&walk, &trail, options) > 0.0,
-            Some(least) => latest(&walk) > (1.0 + least) * latest(&self.walk),
-            None => true,
+        let is_more_similar = latest(&walk) > (1.0 + self.least_gain(when, is_clear)) * latest(&self.walk);
+        let is_likelier = || self.log_odds_of(&walk, &trail, options) > 0.0;
+        let is_better = match when {
+            When::Ended => is_likelier(),
+            When::Over => is_more_similar || is_clear && is_likelier(),
+            When::Regularly | When::BesideOthers => is_more_similar,
         };
         if is_better {
             (self.walk, self.frontal) = (walk, frontal);

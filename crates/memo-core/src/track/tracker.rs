@@ -695,11 +695,13 @@ impl Tracker {
     fn end_walk(&mut self, active: Active) {
         let mut active = if active.settled { active } else { self.begun_on_the_spot(active) };
         active.settle(&self.backdrop, &self.options);
+        // On a smoothed route, the feet would walk on.
+        let standing = active.standing();
         active.begin_earlier(&self.options);
         active.turned(&self.options);
         active.pace_all();
         active.straighten(&self.options.walk);
-        let standing = active.standing();
+        let standing = standing.or_else(|| active.standing());
         active.trim();
         let started = self.started.remove(&active.person);
         let walk_boxes = walk_boxes(&active, started);

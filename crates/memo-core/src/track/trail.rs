@@ -1,7 +1,7 @@
 //! The places of a person on the ground by the rectangles, and the curve through them.
 //!
 //! Each rectangle is a point on the ground, by the rows of feet and crown. The points are smoothed to a curve of slowly
-//! changing acceleration. Of somebody who goes straight, a line explains them as well.
+//! changing acceleration. Of somebody who goes straight, a straight path explains them as well, at whatever speed.
 
 use super::locate::{Crown, Sighting, foot};
 use crate::estimate::arrow::{Arrow, velocity_change};
@@ -18,6 +18,8 @@ pub(super) const JERK_SD: f64 = 0.25;
 pub(super) const CORNER_JERK_SD: f64 = 1.0;
 /// Standard deviation of the acceleration of people, m/s²: who walks at 1.2 m/s turns by 24 degrees in a second.
 const ACCELERATION_SD: f64 = 0.5;
+/// Rounds in which a straight path and the places on it are fitted in turn.
+const LINE_STEPS: usize = 5;
 /// Errors of so many neighbouring rectangles are alike, arms and feet stay where they are for some frames; and for so
 /// many seconds, if frames follow faster.
 const LIKE_FRAMES: f64 = 4.0;
@@ -82,35 +84,62 @@ impl Trail {
         self.axes.iter().zip(&self.places).map(off).sum()
     }
 
-    /// How much more likely the places are on their curve than in even motion on a line, as the logarithm of the ratio.
+    /// How much more likely the places are on their curve than on any straight path, as the logarithm of the ratio. On the
+    /// path the speed may change as much as on the curve: who slows down, stops or sets off does not turn.
     pub fn turn_gain(&self) -> f64 {
         let (Some(first_s), Some(last_s)) = (self.times_s.first(), self.times_s.last()) else { return 0.0 };
         let every_s = (last_s - first_s) / self.times_s.len() as f64;
-        let of = |places: &Vec<Measured>| {
-            let cost = |values: &[f64]| {
-                let off = |(m, x): (&Measured, &f64)| 0.5 * ((m.value - x) / m.sd).powi(2);
-                places.iter().zip(values).map(off).sum::<f64>()
+        let on_curve = self.places.each_ref().map(|places| smoothed(&self.times_s, places, JERK_SD));
+        let gain = self.cost_of(&self.on_a_line()) - self.cost_of(&on_curve);
+        gain * (LIKE_FRAMES * every_s / LIKE_S).min(1.0)
+    }
+
+    /// How far the places are from others, as minus the logarithm of their likelihood.
+    fn cost_of(&self, others: &[Vec<f64>; 2]) -> f64 {
+        let off = |(m, x): (&Measured, &f64)| 0.5 * ((m.value - x) / m.sd).powi(2);
+        self.places.iter().zip(others).flat_map(|(places, others)| places.iter().zip(others)).map(off).sum()
+    }
+
+    /// The most likely places on a straight path, by axis: those along it at a smoothly changing speed, and the line of
+    /// least squares given these, in turn.
+    fn on_a_line(&self) -> [Vec<f64>; 2] {
+        let mut along = self.times_s.clone();
+        for _ in 0..LINE_STEPS {
+            let lines = self.places.each_ref().map(|places| line(&along, places));
+            let speed = lines[0][1].hypot(lines[1][1]).max(f64::MIN_POSITIVE);
+            let seen = |k: usize| {
+                let (mut value, mut weight) = (0.0, 0.0);
+                for (places, [first, slope]) in self.places.iter().zip(&lines) {
+                    let Measured { value: place, sd } = places[k];
+                    let towards = slope / speed;
+                    value += towards * (place - first) / (sd * sd);
+                    weight += towards * towards / (sd * sd);
+                }
+                Measured { value: value / weight, sd: weight.powf(-0.5) }
             };
-            cost(&line(&self.times_s, places)) - cost(&smoothed(&self.times_s, places, JERK_SD))
-        };
-        self.places.iter().map(of).sum::<f64>() * (LIKE_FRAMES * every_s / LIKE_S).min(1.0)
+            along = smoothed(&self.times_s, &(0..along.len()).map(seen).collect::<Vec<_>>(), JERK_SD);
+        }
+        self.places.each_ref().map(|places| {
+            let [first, slope] = line(&along, places);
+            along.iter().map(|x| first + slope * x).collect()
+        })
     }
 }
 
-/// The values on the line of least squares.
-fn line(times_s: &[f64], measured: &[Measured]) -> Vec<f64> {
+/// Value at 0 and slope of the line of least squares.
+fn line(at: &[f64], measured: &[Measured]) -> [f64; 2] {
+    let middle = at.iter().sum::<f64>() / at.len() as f64;
     let [mut w, mut wt, mut wtt, mut wx, mut wtx] = [0.0; 5];
-    for (time_s, m) in times_s.iter().zip(measured) {
-        let (t, weight) = (time_s - times_s[0], m.sd.powi(-2));
+    for (at, m) in at.iter().zip(measured) {
+        let (t, weight) = (at - middle, m.sd.powi(-2));
         w += weight;
         wt += weight * t;
         wtt += weight * t * t;
         wx += weight * m.value;
         wtx += weight * t * m.value;
     }
-    let speed = (w * wtx - wt * wx) / (w * wtt - wt * wt);
-    let first = (wx - speed * wt) / w;
-    times_s.iter().map(|t| first + speed * (t - times_s[0])).collect()
+    let slope = (w * wtx - wt * wx) / (w * wtt - wt * wt);
+    [(wx - slope * wt) / w - slope * middle, slope]
 }
 
 /// The values of smallest Σ (x - measured)² / sd² + Σ (change of the acceleration)² / (jerk² time) + mean of
@@ -229,6 +258,37 @@ pub(super) mod tests {
             // Twice as many frames in the same time show hardly more.
             assert!(gains[1] < 1.7 * gains[0], "{gains:?}");
         }
+    }
+
+    /// Places of somebody who goes along X at 1.2 m/s until a second and then, at changing speed, straight on or to the left.
+    fn changing(speed_mps: fn(f64) -> f64, left: bool) -> Trail {
+        let times_s: Vec<f64> = (0..50).map(|k| 0.04 * f64::from(k)).collect();
+        let mut place = DVec2::ZERO;
+        let mut places = [Vec::new(), Vec::new()];
+        for (k, t) in times_s.iter().enumerate() {
+            let way = if left && *t > 1.0 { DVec2::Y } else { DVec2::X };
+            place += 0.04 * speed_mps(*t) * way;
+            // Rectangles are off by some centimetres, farther in depth.
+            let off = DVec2::new((1.9 * k as f64).sin(), (1.3 * k as f64).cos());
+            for (n, sd) in [0.06, 0.2].into_iter().enumerate() {
+                places[n].push(Measured { value: (place + 0.3 * sd * off)[n], sd });
+            }
+        }
+        Trail { times_s, axes: [DVec2::X, DVec2::Y], places }
+    }
+
+    #[test]
+    fn who_slows_down_stops_or_sets_off_does_not_turn() {
+        let walks = |_: f64| 1.2;
+        let slows_down = |t: f64| 1.2 - 0.4 * t;
+        let stops = |t: f64| 1.2 * ((1.6 - t) / 0.6).clamp(0.0, 1.0);
+        let sets_off = |t: f64| 1.2 * (t / 0.8 - 0.5).clamp(0.0, 1.0);
+        for straight in [walks as fn(f64) -> f64, slows_down, stops, sets_off] {
+            let gain = changing(straight, false).turn_gain();
+            assert!(gain < 0.3 * CLEAR_TURN, "{gain}");
+        }
+        let gain = changing(walks, true).turn_gain();
+        assert!(gain > 2.0 * CLEAR_TURN, "{gain}");
     }
 
     #[test]

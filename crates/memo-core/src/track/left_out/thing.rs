@@ -186,7 +186,8 @@ impl Thing {
 
     /// What was followed in a walk that was none.
     pub fn of_walk(walk_boxes: &WalkBoxes) -> Self {
-        let shots = Shots { seen: walk_boxes.shots.seen, ..Shots::thinned(walk_boxes.shots.all(), MOST_SHOTS) };
+        let shots =
+            Shots { seen: walk_boxes.shots.seen, ..Shots::thinned(walk_boxes.shots.all(), MOST_SHOTS) };
         Self::new(shots)
     }
 
