@@ -4,7 +4,7 @@
 //! 2. The curve is taken instead of the route so far if the contours of the latest frames are more similar on it.
 //! 3. Along the line of sight, contours tell less. Rectangles turn clearly if a curve explains them better than a straight
 //!    path on which the person may slow down, stop or set off. Then the curve is taken of somebody followed by the feet if the
-//!    contours are not less similar on it, and of somebody whose walk would be over if contours and feet together are likelier.
+//!    contours are not less similar on it, and of somebody whose walk would be over if contours and rectangles together are likelier.
 //!
 //! While somebody is followed, the latest frames show the turn from one side only. So when the walk is over, the whole
 //! route of a person who turned is smoothed again.
@@ -100,7 +100,7 @@ impl Active {
         if self.is_on_treadmill {
             return false;
         }
-        let end = self.steps().last().map_or(0, |step| step.frame);
+        let (end, end_s) = self.steps().last().map_or((0, 0.0), |step| (step.frame, step.time_s));
         let kept: Vec<_> = self.kept[from..].iter().filter(|(_, edges)| edges.frame <= end).collect();
         let Some(first_s) = kept.first().map(|(_, edges)| edges.time_s) else { return false };
         let sightings: Vec<Sighting> = kept.iter().filter_map(|(sighting, _)| *sighting).collect();
@@ -118,7 +118,8 @@ impl Active {
             .collect();
         let trail = Trail::new(&anchors, &sightings, &self.camera, &self.crown());
         let Some(curved) = route.continued(&trail.curve(jerk_sd), along_m) else { return false };
-        let is_clear = trail.turn_gain() > CLEAR_TURN;
+        let turn_gain = trail.turn_gain();
+        let is_clear = turn_gain > CLEAR_TURN;
         // 2. A quick look whether it can be better.
         let frames = || self.steps()[before..].iter().zip(&kept).step_by(QUICK_EVERY);
         let quick = |new: &Route| -> f64 {
@@ -136,10 +137,11 @@ impl Active {
             steps[before..].iter().map(|step| f64::from(step.similarity * step.visible)).sum()
         };
         let is_more_similar = latest(&walk) > (1.0 + self.least_gain(when, is_clear)) * latest(&self.walk);
-        let is_likelier = || self.log_odds_of(&walk, &trail, options) > 0.0;
+        // The rectangles of who stops go anywhere, as changes vanish, but then the contours do not follow them.
+        let contours = || log_odds(latest(&walk), latest(&self.walk), end_s - first_s, &options.walk.swap);
         let is_better = match when {
-            When::Ended => is_likelier(),
-            When::Over => is_more_similar || is_clear && is_likelier(),
+            When::Ended => self.log_odds_of(&walk, &trail, options) > 0.0,
+            When::Over => is_more_similar || is_clear && turn_gain + contours() > 0.0,
             When::Regularly | When::BesideOthers => is_more_similar,
         };
         if is_better {

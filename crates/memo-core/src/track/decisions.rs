@@ -92,10 +92,10 @@ pub(in crate::track) const TURN_GAIN: f64 = 0.01;
 pub(in crate::track) const EARLY_TURN_GAIN: f64 = 0.05;
 /// Rectangles turn clearly if they are that much more likely (as the logarithm of the ratio) on a curve than on a straight
 /// path on which the speed changes as much. Chosen on seven drawn people whose walks would have been over where they turned
-/// into the line of sight or out of it, who had 1.5 to 7.5 there, and on 19 others who stood still for 2 to 4 s: 17 of these
-/// had up to 1.4, the others 1.9 and 4.2. So it does not decide alone where a walk would be over: the curve must also be
-/// likelier by contours and feet, and of all 19 it was less likely by contours, by a factor of 2.6 and more. The margin was
-/// not measured on people on whom it was not chosen.
+/// into the line of sight or out of it, who had 1.5 to 7.5 there, and on 20 who stood still for 2 to 4 s: 17 of these
+/// had up to 1.4, the others 1.9 and twice 4.2. So where a walk would be over, it does not decide alone: contours and
+/// rectangles together must be more likely on the curve. Of the 20 they were less likely by a factor of 1.6 and more. The
+/// margin was not measured on people on whom it was not chosen.
 pub(in crate::track) const CLEAR_TURN: f64 = 1.5;
 /// The same of the quick comparison, after which the frames are followed again.
 pub(in crate::track) const QUICK_TURN_GAIN: f64 = 0.008;
