@@ -72,3 +72,25 @@ def test_a_frame_on_the_curve_is_explained_as_it_was_searched(run):
 def test_the_report_tells_the_turn(run):
     text = write_report(run).path.read_text(encoding="utf-8")
     assert "turning left by about" in text
+
+
+def test_who_turns_into_the_line_of_sight_stays_one_walk():
+    """Feet show the last frames, without joint angles, in the gait cycle of the contours before."""
+    scene = memo.demo_scene(4, frames=90, slant_deg=-45, leftward=False, turn_deg=-80)
+    (walk,) = memo.track(list(scene.frames), fps=25, camera=scene.camera, height_m=scene.height_m).walks
+    columns = walk.columns
+    truth = {name: scene.truth[name][columns["frame"]] for name in ("heading_rad", "x_m", "y_m", "phase")}
+    eye = scene.camera.position
+    sight_rad = np.arctan2(truth["y_m"] - eye[1], truth["x_m"] - eye[0])
+    off_the_sight_deg = np.degrees(np.abs(np.arcsin(np.sin(truth["heading_rad"] - sight_rad))))
+    along = off_the_sight_deg < 25
+    assert along.sum() > 6 and not walk.is_frontal
+    for name in ("right_knee_deg", "left_hip_deg"):
+        assert np.isnan(columns[name][along]).all()
+        assert np.isfinite(columns[name][off_the_sight_deg > 35]).mean() > 0.9
+    off_m = np.hypot(columns["x_m"] - truth["x_m"], columns["y_m"] - truth["y_m"])
+    assert np.median(off_m[along]) < 0.15 and np.median(off_m) < 0.1
+    off = columns["phase"] - truth["phase"]
+    assert np.median(np.abs(off - np.round(off))[along]) < 0.05
+    heading_off = np.angle(np.exp(1j * (columns["heading_rad"] - truth["heading_rad"])))
+    assert np.degrees(np.median(np.abs(heading_off[along]))) < 8

@@ -14,6 +14,7 @@ use super::locate::{Crown, Sighting, locate_slanting};
 use super::options::TrackerOptions;
 use super::people::{Now, Sign};
 use super::search::Scene;
+use super::standing::Standing;
 use super::start::{StartReport, start};
 use super::steady::CameraMotion;
 use super::walk::{Beginning, FrameEdges, Step, Twin, Walk};
@@ -21,7 +22,7 @@ use crate::calibrate::TiltEstimate;
 use crate::model::body::PART_COUNT;
 use crate::model::{Camera, EllipticCylinder, Walker};
 use glam::DVec3;
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap, HashSet};
 
 /// Somebody who moves faster over the last frames has left the treadmill, m/s.
 const LEAVING_MPS: f64 = 0.7;
@@ -43,11 +44,25 @@ fn mean_similarity(twin: &Twin) -> f64 {
     twin.similarity_sum / twin.visible_sum.max(f64::MIN_POSITIVE)
 }
 
+/// The same of a walk that turns into the line of sight, where contours are less similar: the lower of the two.
+fn usual_similarity(twin: &Twin) -> f64 {
+    let of = |by_feet: bool| {
+        let of_kind = || twin.steps.iter().filter(|step| step.by_feet == by_feet);
+        let visible: f64 = of_kind().map(|step| f64::from(step.visible)).sum();
+        let found: f64 = of_kind().map(|step| f64::from(step.similarity * step.visible)).sum();
+        (visible > 0.0).then_some(found / visible)
+    };
+    match [true, false].map(of) {
+        [Some(feet), Some(contours)] => feet.min(contours),
+        _ => mean_similarity(twin),
+    }
+}
+
 /// Frames kept for fitting.
 pub(super) type Kept = [(Option<Sighting>, FrameEdges)];
 
 /// The current walk.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct Active {
     /// Number of the person, in order of appearance.
     pub(super) person: usize,
@@ -74,6 +89,10 @@ pub(super) struct Active {
     pub(super) is_on_treadmill: bool,
     /// On the spot, the frames of the stream until the start: later ones do not show the empty scene.
     pub(super) early: Option<Backdrop>,
+    /// The rectangles of all changes, by frame: they reach down to feet that hardly move.
+    pub(super) feet: BTreeMap<usize, Sighting>,
+    /// What was seen before the walk started.
+    pub(super) earlier: Standing,
     /// What the feet show of somebody who walks towards the camera or away from it.
     pub(super) frontal: Option<Frontal>,
 }
@@ -97,7 +116,12 @@ impl Active {
 
     /// Probability that left and right are swapped; the feet of somebody who walks towards the camera do not show it.
     pub(super) fn p_swapped(&self, options: &TrackerOptions) -> f64 {
-        if self.frontal.is_some() { 0.5 } else { self.walk.swap_probability(&options.walk.swap) }
+        if self.is_frontal() { 0.5 } else { self.walk.swap_probability(&options.walk.swap) }
+    }
+
+    /// The mean height of the crown.
+    pub(super) fn crown(&self) -> Crown {
+        Crown { height_m: self.walk.walker.level_crown_height_m(), sd_m: self.height.sd_in_camera_m() }
     }
 
     /// The scene near a place along the route.
@@ -161,7 +185,7 @@ impl Active {
         let speed_mps = speeds_mps.fold(f64::INFINITY, f64::min);
         let is_seen = matched(recent).is_some_and(|found| found >= LOST_SHARE * mean_similarity(twin));
         let stands = is_seen && speed_mps < STANDING_SHARE * mean_mps;
-        let is_on_a_path = !self.is_on_treadmill && self.frontal.is_none();
+        let is_on_a_path = !self.is_on_treadmill && !last.by_feet;
         self.sign().filter(|_| stands && is_on_a_path).map(|sign| Sign { stands, ..sign })
     }
 
@@ -190,8 +214,10 @@ impl Active {
         let left = if self.is_on_treadmill { covered_m > LEAVING_MPS * elapsed_s } else { is_slow };
         let stopped = left || cycles < SLOWEST_HZ * elapsed_s;
         let unseen = |frontal: &Frontal| count - frontal.seen().min(count) >= RECENT_FRAMES;
-        let stopped = stopped || self.frontal.as_ref().is_some_and(unseen);
-        stopped || matched(recent).is_some_and(|found| found < LOST_SHARE * mean_similarity(twin))
+        let is_unseen = last.by_feet && self.frontal.as_ref().is_some_and(unseen);
+        stopped
+            || is_unseen
+            || matched(recent).is_some_and(|found| found < LOST_SHARE * usual_similarity(twin))
     }
 
     /// True if for some time too little of the person was visible for a decision.
@@ -236,14 +262,15 @@ impl Active {
     /// neighbours.
     pub(super) fn trim(&mut self) {
         let twin = &self.walk.twins[self.walk.best()];
-        let low = LOST_SHARE * mean_similarity(twin);
+        let low = LOST_SHARE * usual_similarity(twin);
         let absent = twin.steps.iter().take_while(|s| f64::from(s.similarity) < low).count();
         let is_gone = |s: &&Step| f64::from(s.similarity) < low || s.visible < DECIDING_SHARE;
         let gone =
             Some(twin.steps.iter().rev().take_while(is_gone).count()).filter(|gone| *gone >= LEAST_GONE);
         let over = if self.is_over() { RECENT_FRAMES / 2 } else { 0 };
         let end = twin.steps.len() - over.max(gone.unwrap_or(0));
-        let end = self.frontal.as_ref().map_or(end, |frontal| frontal.seen().min(end));
+        let frontal = self.frontal.as_ref().filter(|_| twin.steps.last().is_some_and(|step| step.by_feet));
+        let end = frontal.map_or(end, |frontal| frontal.seen().min(end));
         self.walk.keep(absent.min(end)..end);
     }
 
@@ -275,6 +302,7 @@ impl Active {
             }
             self.adopt_person(&kept, backdrop, options);
             self.kept = kept;
+            self.pace_again(options);
         }
     }
 
@@ -287,13 +315,13 @@ impl Active {
         p_swapped: Option<f64>,
     ) -> Option<Result<WalkFit, FitError>> {
         let fit = options.fit.as_ref()?;
-        if self.frontal.is_some() {
+        if self.is_frontal() {
             return Some(Err(FitError::Frontal));
         }
         let steps = &self.walk.twins[self.walk.best()].steps;
-        let first = steps.first().map_or(usize::MAX, |step| step.frame);
-        let last = steps.last().map_or(0, |step| step.frame);
-        let pieces = self.pieces.iter().filter(|piece| (first..=last).contains(&piece.frame));
+        let shown: HashSet<usize> =
+            steps.iter().filter(|step| !step.by_feet).map(|step| step.frame).collect();
+        let pieces = self.pieces.iter().filter(|piece| shown.contains(&piece.frame));
         let views = match self.is_on_treadmill {
             true => self.early.as_ref().unwrap_or(backdrop).views_on_the_spot(pieces),
             false => backdrop.views(pieces),
@@ -324,6 +352,7 @@ impl Active {
             average: &self.average,
             height: &self.height,
             is_on_treadmill: self.is_on_treadmill,
+            depth_sd_m: self.depth_sd_m,
             filter: &options.walk.filter,
         }
     }
@@ -446,6 +475,8 @@ pub(super) mod tests {
             pieces: Vec::new(),
             is_on_treadmill: false,
             early: None,
+            feet: BTreeMap::new(),
+            earlier: Standing::default(),
             frontal: None,
         }
     }
@@ -460,7 +491,7 @@ pub(super) mod tests {
         let heights = Axis::around(1.15, 0.1, 0.02);
         let look = Look { window: WINDOW, heights, best: state.hypothesis(), path: PATH };
         let (time_s, measured) = (FRAME_S * frame as f64, Some(state.hypothesis()));
-        Step { frame, time_s, state, measured, similarity, visible: 1.0, shared: false, look }
+        Step { frame, time_s, state, measured, similarity, visible: 1.0, shared: false, by_feet: false, look }
     }
 
     /// A good walk of `count` frames whose last twelve have these speeds and this similarity.

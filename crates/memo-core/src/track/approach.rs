@@ -1,14 +1,16 @@
 //! Starts people who walk towards the camera or away from it, and lays their walks through the feet of [`Frontal`].
 
 use super::active::Active;
-use super::frontal::{Frontal, WINDOW};
+use super::frontal::{Frontal, Lowest, WINDOW};
 use super::height::BodyHeight;
 use super::locate::{Course, Sighting};
 use super::options::TrackerOptions;
+use super::route::Route;
 use super::standing::Standing;
 use super::start::{Direction, StartReport, start};
 use super::walk::{Beginning, FrameEdges, Walk, WalkOptions};
 use crate::model::{Camera, Walker};
+use std::collections::BTreeMap;
 
 /// What a start needs besides the frames.
 pub(super) struct Approach<'a> {
@@ -35,22 +37,22 @@ impl Approach<'_> {
             height: *height,
             depth_sd_m: frontal.depth_sd_m(),
             start,
-            walk: Walk::new(walker.clone(), frontal.path, beginning),
+            walk: Walk::new(walker.clone(), frontal.route.clone(), beginning),
             average: walker.clone(),
             kept: Vec::new(),
             gait_speed_mps: beginning.speed_mps,
             settled: true,
             is_on_treadmill: false,
             early: None,
-            pieces: Vec::new(),
+            pieces: standing.pieces,
+            feet: standing.feet,
+            earlier: Standing::default(),
             frontal: None,
         };
-        for (_, edges) in &standing.kept {
-            active.walk.follow(edges, camera, &options.walk);
-        }
         active.kept = standing.kept;
         active.frontal = Some(frontal);
-        active.pace_all();
+        let count = active.kept.len();
+        active.follow_on(&active.walk.route.clone(), 0..count, usize::MAX, &options.walk);
         Ok(active)
     }
 
@@ -60,24 +62,58 @@ impl Approach<'_> {
         let frames: Vec<&FrameEdges> =
             standing.kept.iter().map(|(_, edges)| edges).take(options.start_frames).collect();
         let course = Course {
-            path: frontal.path,
+            path: frontal.route.at(beginning.along_m),
             along_m: frontal.paces.iter().map(|pace| pace.along_m).collect(),
             speed_mps: beginning.speed_mps,
             depth_sd_m: frontal.depth_sd_m(),
         };
         let seen = start(&frames, &course, &self.walker, self.camera, &options.cadence, &options.walk)?;
-        let (path, beginning) = (frontal.path, *beginning);
+        let (path, beginning) = (course.path, *beginning);
         let direction = Direction::Forward;
         Some(StartReport { path, beginning, direction, p_other_direction: 0.0, ..seen })
     }
 }
 
 impl Active {
-    /// Where the feet of the last frame are, of somebody who walks towards the camera or away from it.
-    pub(super) fn pace(&mut self, time_s: f64, feet: Option<&Sighting>) {
+    /// Whether the feet alone showed place and phase all along.
+    pub(super) fn is_frontal(&self) -> bool {
+        self.frontal.is_some() && self.steps().iter().all(|step| step.by_feet)
+    }
+
+    /// The lowest rows of a kept frame.
+    pub(super) fn lowest(&self, sighting: Option<Sighting>, frame: usize) -> Lowest {
+        Lowest { firm: sighting, all: self.feet.get(&frame).copied() }
+    }
+
+    /// What feet and contours showed so far.
+    pub(super) fn recorded(&self) -> Frontal {
+        let firm: BTreeMap<usize, Sighting> =
+            self.kept.iter().filter_map(|(sighting, edges)| Some((edges.frame, (*sighting)?))).collect();
+        Frontal::of_steps(&self.walk, |frame| self.lowest(firm.get(&frame).copied(), frame), &self.camera)
+    }
+
+    /// Records feet and contours anew after the walk was followed again.
+    pub(super) fn pace_again(&mut self, options: &TrackerOptions) {
+        self.frontal = match self.frontal {
+            Some(_) if !self.walk.route.is_straight() => Some(self.recorded()),
+            _ => None,
+        };
+        if self.frontal.is_some() {
+            let last = self.steps().last().map_or(0, |step| step.frame);
+            self.follow_on(&self.walk.route.clone(), 0..self.steps().len(), last, &options.walk);
+        }
+    }
+
+    /// Where the feet of the last frame are along the line of sight, and elsewhere what the contours showed.
+    pub(super) fn pace(&mut self, sighting: Option<Sighting>) {
+        let last = self.steps().len() - 1;
+        let step = self.steps()[last];
+        let lowest = self.lowest(sighting, step.frame);
         let Some(frontal) = &mut self.frontal else { return };
-        frontal.push(time_s, feet);
-        let last = frontal.paces.len() - 1;
+        frontal.push(step.time_s, &lowest);
+        if !frontal.is_by_feet(last) {
+            return frontal.see(last, &self.walk);
+        }
         let Some(variances) = frontal.solve(last.saturating_sub(WINDOW)) else { return };
         frontal.lay(last, variances[variances.len() - 1], &mut self.walk);
     }
@@ -91,15 +127,49 @@ impl Active {
         }
     }
 
+    /// Follows the steps of a range again, up to the frame `last`, on another route: by the feet where they show the walk.
+    pub(super) fn follow_on(
+        &mut self,
+        route: &Route,
+        steps: std::ops::Range<usize>,
+        last: usize,
+        options: &WalkOptions,
+    ) {
+        let mut frontal = self.frontal.take();
+        let variances = frontal.as_mut().and_then(|frontal| frontal.solve(0)).unwrap_or_default();
+        match &frontal {
+            Some(frontal) if steps.start == 0 && frontal.is_by_feet(0) => {
+                self.walk = Walk::new(self.walk.walker.clone(), route.clone(), frontal.beginning());
+            }
+            _ => {
+                let at_m = self.walk.beginning.along_m;
+                self.walk.beginning.along_m = route.along(self.walk.route.place(at_m), at_m);
+                self.walk.go_back_to(steps.start);
+                self.walk.route = route.clone();
+            }
+        }
+        let end = self.kept.partition_point(|(_, edges)| edges.frame <= last);
+        for (k, (_, edges)) in steps.clone().zip(&self.kept[end.saturating_sub(steps.len())..end]) {
+            self.walk.follow(edges, &self.camera, options);
+            match (&mut frontal, variances.get(k)) {
+                (Some(frontal), Some(of)) if frontal.is_by_feet(k) => frontal.lay(k, *of, &mut self.walk),
+                (Some(frontal), _) => frontal.see(k, &self.walk),
+                _ => {}
+            }
+        }
+        self.frontal = frontal;
+        self.pace_all();
+    }
+
     /// Follows all frames again, on the line through all feet. Without a fit, the first frames of a long walk are gone, and
     /// it stays on its path.
     pub(super) fn straighten(&mut self, options: &WalkOptions) {
         let Some(frontal) = &self.frontal else { return };
-        if self.kept.len() != self.steps().len() {
+        if !frontal.route.is_straight() || self.kept.len() != self.steps().len() {
             return;
         }
         let Some((mut renewed, variances)) = frontal.on_path_of_all() else { return };
-        let mut walk = Walk::new(self.walk.walker.clone(), renewed.path, renewed.beginning());
+        let mut walk = Walk::new(self.walk.walker.clone(), renewed.route.clone(), renewed.beginning());
         for (k, ((_, edges), of)) in self.kept.iter().zip(variances).enumerate() {
             walk.follow(edges, &self.camera, options);
             renewed.lay(k, of, &mut walk);

@@ -10,11 +10,13 @@ use super::left_out::Reason;
 use super::locate::{Course, Crown, LocateError, Sighting, camera_from_sightings, locate, same_person};
 use super::options::TrackerOptions;
 use super::options::start_height;
+use super::standing::Standing;
 use super::start::{StartReport, StartSearch};
 use super::walk::{FrameEdges, Walk};
 use crate::calibrate::TiltEstimate;
 use crate::image::Rectangle;
 use crate::model::{Camera, GaitStyle, Tilt, Walker, assumed_field_of_view_rad};
+use std::collections::BTreeMap;
 
 /// A candidate is dropped after this many consecutive frames without it.
 pub(super) const MISSED_FRAMES: usize = 3;
@@ -130,6 +132,8 @@ impl Candidate {
             gait_speed_mps: course.speed_mps,
             settled: false,
             is_on_treadmill: false,
+            feet: BTreeMap::new(),
+            earlier: Standing::default(),
             frontal: None,
             early: None,
             pieces: self.seen.iter().filter_map(|seen| seen.piece.clone()).collect(),

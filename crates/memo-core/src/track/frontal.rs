@@ -18,6 +18,7 @@
 
 use super::decisions::{ALONG_THE_SIGHT_RAD, COMMON_ROW_SD_PX, FASTEST_MPS, FRONTAL_GAIN, SLOWEST_MPS};
 use super::locate::{MASK_MARGIN_PX, Sighting};
+use super::route::Route;
 use super::search::{Hypothesis, Path};
 use super::standing::Standing;
 use super::start::CadenceRange;
@@ -55,6 +56,13 @@ const ROW_SD_PX: f64 = 1.5;
 const LIKE_FRAMES: f64 = 4.0;
 /// Beyond this many standard deviations, residuals count ever less (Cauchy weights).
 const CAUCHY_SD: f64 = 1.5;
+/// Standard deviations of the place along the route, metres, and of the phase, cycles, that contours show.
+const CONTOURS_SD_M: f64 = 0.05;
+const CONTOURS_PHASE_SD: f64 = 0.03;
+/// On a curve, the feet show place and phase within this angle of the line of sight, and contours beyond it.
+const BY_FEET_RAD: f64 = 0.5;
+/// Frames that show the speed and cadence with which places and phases go on.
+const LEADING: usize = 12;
 /// Changes in a second, as standard deviations: of the speed, m/s, and of the cadence, cycles/s.
 const SPEED_CHANGE_SD: f64 = 0.1;
 const CADENCE_CHANGE_SD: f64 = 0.03;
@@ -62,63 +70,61 @@ const CADENCE_CHANGE_SD: f64 = 0.03;
 pub(super) const WINDOW: usize = 250;
 const HELD: f64 = 1e6;
 
-/// What the feet of one frame show.
+/// What the feet of one frame show: where the ray of the lowest row meets the ground, and that of one pixel farther up.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Feet {
-    /// Where the ray of the lowest row meets the ground, and its place along the path, metres.
     place: DVec2,
-    along_m: f64,
-    /// Metres on the ground per pixel of that row.
-    row_m: f64,
+    above: DVec2,
 }
 
-/// Place along the path and phase (not wrapped) of one frame.
+/// Place along the route and phase (not wrapped) of one frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Pace {
     time_s: f64,
     feet: Option<Feet>,
+    /// The same as the contours show it; `None` where only the feet do.
+    contours: Option<[f64; 2]>,
     pub(super) along_m: f64,
     phase: f64,
 }
 
-/// A walk that the feet show.
-#[derive(Debug, Clone)]
-pub(super) struct Frontal {
-    pub(super) path: Path,
-    reach: Reach,
-    pub(super) paces: Vec<Pace>,
-    /// Whether the feet are those of all changes, or those of the firm ones.
-    pub(super) by_all: bool,
+/// The lowest rows of a frame: those of the firm changes and of all changes.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(super) struct Lowest {
+    pub(super) firm: Option<Sighting>,
+    pub(super) all: Option<Sighting>,
 }
 
-/// How far the lowest row of the nearer foot lies ahead of the torso on the ground, metres, at places along a path.
+/// A walk that the feet show where it goes along the line of sight, and contours elsewhere.
+#[derive(Debug, Clone)]
+pub(super) struct Frontal {
+    pub(super) route: Route,
+    reach: Reach,
+    pub(super) paces: Vec<Pace>,
+    /// Whether the feet are those of all changes, or those of the firm ones: of who goes away, and of who comes nearer.
+    by_all: [bool; 2],
+}
+
+/// How far the lowest row of the nearer foot lies ahead of the torso on the ground, metres, at places along a route.
 #[derive(Debug, Clone)]
 struct Reach {
     walker: Walker,
     camera: Camera,
-    path: Path,
+    route: Route,
     /// Height of the ankle of a foot that stands.
     ankle_m: f64,
-    /// By how much the shoe reaches farther towards the camera than the ankle.
-    shoe_m: f64,
-    /// How much earlier in the cycle the feet are seen than they stand.
-    lead: f64,
     nodes: BTreeMap<i64, [f64; PHASES]>,
 }
 
 impl Reach {
-    fn new(walker: &Walker, camera: &Camera, path: Path) -> Self {
+    fn new(walker: &Walker, camera: &Camera, route: &Route) -> Self {
         let ankle_m = |k: usize| walker.pose(DVec3::ZERO, 0.0, k as f64 / PHASES as f64).right.ankle.z;
         let lowest_m = (0..PHASES).map(ankle_m).fold(f64::INFINITY, f64::min);
-        let comes_nearer = path.direction().dot(camera.position().truncate() - path.origin) > 0.0;
-        let half_m = 0.5 * walker.body.proportions.foot * walker.body.height_m;
         Self {
             walker: walker.clone(),
             camera: camera.clone(),
-            path,
+            route: route.clone(),
             ankle_m: lowest_m + walker.level_torso_height_m(),
-            shoe_m: if comes_nearer { 0.0 } else { -half_m },
-            lead: if comes_nearer { LEAD[0] } else { LEAD[1] },
             nodes: BTreeMap::new(),
         }
     }
@@ -142,25 +148,32 @@ impl Reach {
             return *values;
         }
         let along_m = node as f64 * NODE_M;
+        let path = self.route.at(along_m);
+        // The shoe of who goes away reaches farther towards the camera than the ankle.
+        let half_m = 0.5 * self.walker.body.proportions.foot * self.walker.body.height_m;
+        let [lead, shoe_m] =
+            if comes_nearer(&path, along_m, &self.camera) { [LEAD[0], 0.0] } else { [LEAD[1], -half_m] };
         let values = std::array::from_fn(|k| {
-            let phase = k as f64 / PHASES as f64 + self.lead;
+            let phase = k as f64 / PHASES as f64 + lead;
             // Both sides have the same curve, half a cycle apart.
-            0.5 * (self.nearer(along_m, phase) + self.nearer(along_m, phase + 0.5)) + self.shoe_m
+            0.5 * (self.nearer(&path, along_m, phase) + self.nearer(&path, along_m, phase + 0.5)) + shoe_m
         });
         self.nodes.insert(node, values);
         values
     }
 
-    /// The reach of the foot whose sole is lower in the image; 0 where the camera does not see it.
-    fn nearer(&self, along_m: f64, phase: f64) -> f64 {
+    /// The reach of the foot whose sole is lower in the image, below the torso; 0 where the camera does not see it.
+    fn nearer(&self, path: &Path, along_m: f64, phase: f64) -> f64 {
         let height_m = self.walker.level_torso_height_m() + self.walker.gait.vertical_m(phase);
-        let torso = self.path.point(along_m, height_m);
-        let posed = self.walker.pose(torso, self.path.heading_rad, phase);
+        let torso = path.point(along_m, height_m);
+        let posed = self.walker.pose(torso, path.heading_rad, phase);
         let soles = [posed.right, posed.left].map(|side| side.ankle - self.ankle_m * DVec3::Z);
         let pixels = soles.iter().filter_map(|sole| self.camera.project_ideal(*sole));
-        let lowest = pixels.reduce(|a, b| if b.y > a.y { b } else { a });
-        let point = lowest.and_then(|pixel| self.camera.ground_point(pixel));
-        point.map_or(0.0, |point| self.path.along(point.truncate()) - along_m)
+        let lowest = pixels.map(|pixel| pixel.y).reduce(f64::max);
+        let column = self.camera.project_ideal(torso).map(|pixel| pixel.x);
+        let pixel = column.zip(lowest).map(|(x, y)| DVec2::new(x, y));
+        let point = pixel.and_then(|pixel| self.camera.ground_point(pixel));
+        point.map_or(0.0, |point| path.along(point.truncate()) - along_m)
     }
 }
 
@@ -169,15 +182,22 @@ fn margin_px(by_all: bool) -> f64 {
     MASK_MARGIN_PX + if by_all { ALL_MARGIN_PX } else { 0.0 }
 }
 
+impl Feet {
+    /// Metres on the ground per pixel of the lowest row.
+    fn row_m(&self) -> f64 {
+        self.place.distance(self.above)
+    }
+}
+
 /// Where the lowest changes of a rectangle lie on the ground, and one pixel farther up; `None` above the horizon.
-fn feet(sighting: &Sighting, margin_px: f64, camera: &Camera) -> Option<[DVec2; 2]> {
+fn feet(sighting: &Sighting, margin_px: f64, camera: &Camera) -> Option<Feet> {
     let r = &sighting.rectangle;
     let (middle, bottom) = (0.5 * (r.left + r.right) as f64, r.bottom as f64 - margin_px);
     let on_ground = |row: f64| {
         let pixel = DVec2::new(middle, row);
         camera.ground_point(camera.undistort(pixel).ok()?).map(DVec3::truncate)
     };
-    Some([on_ground(bottom)?, on_ground(bottom - 1.0)?])
+    Some(Feet { place: on_ground(bottom)?, above: on_ground(bottom - 1.0)? })
 }
 
 /// A line of phase that explains the feet.
@@ -193,6 +213,12 @@ struct Line {
 }
 
 impl Frontal {
+    /// A walk of which nothing was seen yet.
+    fn on_route(route: &Route, walker: &Walker, camera: &Camera) -> Self {
+        let reach = Reach::new(walker, camera, route);
+        Self { route: route.clone(), reach, paces: Vec::new(), by_all: [true, false] }
+    }
+
     /// The walk that the feet of some frames show; `None` if they show none. Feet that come nearer are seen best in the
     /// firm changes, and those that go away in all changes, so both are tried.
     pub(super) fn begin(
@@ -211,15 +237,28 @@ impl Frontal {
             return None;
         }
         for (firm, edges) in &standing.kept {
-            let seen = if frontal.by_all { standing.feet.get(&edges.frame) } else { firm.as_ref() };
+            let seen = Lowest { firm: *firm, all: standing.feet.get(&edges.frame).copied() };
             let elapsed_s = edges.time_s - line.first_s;
             let along_m = line.place[0] + line.place[1] * elapsed_s;
             let phase = line.phase_at_start + line.rate_hz * elapsed_s;
-            let feet = frontal.feet_of(seen);
-            frontal.paces.push(Pace { time_s: edges.time_s, feet, along_m, phase });
+            let feet = frontal.feet_of(&seen, along_m);
+            frontal.paces.push(Pace { time_s: edges.time_s, feet, contours: None, along_m, phase });
         }
         frontal.solve(0);
         Some(frontal)
+    }
+
+    /// The walk that contours followed so far.
+    pub(super) fn of_steps(walk: &Walk, lowest: impl Fn(usize) -> Lowest, camera: &Camera) -> Self {
+        let mut frontal = Self::on_route(&walk.route, &walk.walker, camera);
+        let best = walk.best();
+        for step in &walk.twins[best].steps {
+            let (along_m, phase) = (step.state.along.position, step.state.phase.position - 0.5 * best as f64);
+            let feet = frontal.feet_of(&lowest(step.frame), along_m);
+            let contours = Some([along_m, phase]);
+            frontal.paces.push(Pace { time_s: step.time_s, feet, contours, along_m, phase });
+        }
+        frontal
     }
 
     /// The best line of phase through sightings, and how much more likely it is than even motion.
@@ -233,14 +272,15 @@ impl Frontal {
         // 1. The path.
         let seen: Vec<(f64, DVec2)> = sightings
             .iter()
-            .filter_map(|s| Some((s.time_s, feet(s, margin_px(by_all), camera)?[0])))
+            .filter_map(|s| Some((s.time_s, feet(s, margin_px(by_all), camera)?.place)))
             .collect();
         let (path, speed_mps) = path_through(&seen)?;
-        if !(SLOWEST_MPS..FASTEST_MPS).contains(&speed_mps) || !is_along_the_sight(&path, camera) {
+        let is_along = off_the_sight_rad(&path, 0.0, camera) < ALONG_THE_SIGHT_RAD;
+        if !(SLOWEST_MPS..FASTEST_MPS).contains(&speed_mps) || !is_along {
             return None;
         }
-        let reach = Reach::new(walker, camera, path);
-        let mut frontal = Self { path, reach, paces: Vec::new(), by_all };
+        let mut frontal = Self::on_route(&path.into(), walker, camera);
+        frontal.by_all[usize::from(comes_nearer(&path, 0.0, camera))] = by_all;
         // 2. The best line of phase against even motion.
         let points: Vec<(f64, f64)> = seen.iter().map(|(t, place)| (*t, path.along(*place))).collect();
         let line = frontal.best_line(&points, rates)?;
@@ -250,10 +290,16 @@ impl Frontal {
         Some((gain, frontal, line))
     }
 
-    fn feet_of(&self, sighting: Option<&Sighting>) -> Option<Feet> {
-        let [place, above] = feet(sighting?, margin_px(self.by_all), &self.reach.camera)?;
-        let along_m = self.path.along(place);
-        Some(Feet { place, along_m, row_m: (self.path.along(above) - along_m).abs() })
+    /// Whether feet and not contours show a place and its phase. A straight walk was started by the feet.
+    pub(super) fn is_along(&self, along_m: f64) -> bool {
+        self.route.is_straight()
+            || off_the_sight_rad(&self.route.at(along_m), along_m, &self.reach.camera) < BY_FEET_RAD
+    }
+
+    fn feet_of(&self, seen: &Lowest, along_m: f64) -> Option<Feet> {
+        let camera = &self.reach.camera;
+        let by_all = self.by_all[usize::from(comes_nearer(&self.route.at(along_m), along_m, camera))];
+        feet(&if by_all { seen.all } else { seen.firm }?, margin_px(by_all), camera)
     }
 
     /// The same walk on the line through the feet of all frames, with the variances of place and phase.
@@ -261,14 +307,21 @@ impl Frontal {
         let seen: Vec<(f64, DVec2)> =
             self.paces.iter().filter_map(|pace| Some((pace.time_s, pace.feet?.place))).collect();
         let (path, _) = path_through(&seen)?;
-        let reach = Reach::new(&self.reach.walker, &self.reach.camera, path);
-        let mut renewed = Self { path, reach, ..self.clone() };
-        for pace in &mut renewed.paces {
-            pace.along_m = path.along(self.path.point(pace.along_m, 0.0).truncate());
-            pace.feet = pace.feet.map(|feet| Feet { along_m: path.along(feet.place), ..feet });
-        }
+        let mut renewed = self.moved_to(&path.into());
         let variances = renewed.solve(0)?;
         Some((renewed, variances))
+    }
+
+    /// The same places on another route.
+    pub(super) fn moved_to(&self, route: &Route) -> Self {
+        let reach = Reach::new(&self.reach.walker, &self.reach.camera, route);
+        let mut moved = Self { route: route.clone(), reach, ..self.clone() };
+        for pace in &mut moved.paces {
+            let place = |along_m: f64| route.along(self.route.place(along_m), along_m);
+            pace.along_m = place(pace.along_m);
+            pace.contours = pace.contours.map(|[along_m, phase]| [place(along_m), phase]);
+        }
+        moved
     }
 
     /// The line of phase from which feet at (time, place) are the least off.
@@ -313,21 +366,71 @@ impl Frontal {
     /// Standard deviation that all places along the path have in common, metres: of the reach of a person and of the
     /// lowest row.
     pub(super) fn depth_sd_m(&self) -> f64 {
-        let row_m: Vec<f64> = self.paces.iter().filter_map(|pace| Some(pace.feet?.row_m)).collect();
+        let row_m: Vec<f64> = self.paces.iter().filter_map(|pace| Some(pace.feet?.row_m())).collect();
         let mean_m = row_m.iter().sum::<f64>() / row_m.len().max(1) as f64;
         REACH_SD_M.hypot(COMMON_ROW_SD_PX * mean_m)
     }
 
     /// A further frame, at first where speed and cadence lead.
-    pub(super) fn push(&mut self, time_s: f64, sighting: Option<&Sighting>) {
-        let [before, last] = [2, 1].map(|n| self.paces[self.paces.len() - n]);
+    pub(super) fn push(&mut self, time_s: f64, seen: &Lowest) {
+        let last = self.paces[self.paces.len() - 1];
+        let before = self.paces[self.paces.len().saturating_sub(1 + LEADING)];
         let share = (time_s - last.time_s) / (last.time_s - before.time_s);
-        self.paces.push(Pace {
-            time_s,
-            feet: self.feet_of(sighting),
-            along_m: last.along_m + share * (last.along_m - before.along_m),
-            phase: last.phase + share * (last.phase - before.phase),
-        });
+        let along_m = last.along_m + share * (last.along_m - before.along_m);
+        let phase = last.phase + share * (last.phase - before.phase);
+        let feet = self.feet_of(seen, along_m);
+        self.paces.push(Pace { time_s, feet, contours: None, along_m, phase });
+    }
+
+    /// A frame before the first, near a place, where the phase of the next frames leads.
+    pub(super) fn precede(&mut self, time_s: f64, seen: &Lowest, place: DVec2) {
+        let (first, later) = (self.paces[0], self.paces[LEADING.min(self.paces.len() - 1)]);
+        let rate_hz = (later.phase - first.phase) / (later.time_s - first.time_s);
+        let along_m = self.route.along(place, first.along_m);
+        let phase = first.phase - rate_hz * (first.time_s - time_s);
+        let feet = self.feet_of(seen, along_m);
+        self.paces.insert(0, Pace { time_s, feet, contours: None, along_m, phase });
+    }
+
+    /// The mean speed of some frames, m/s.
+    pub(super) fn speed_mps(&self, range: std::ops::Range<usize>) -> f64 {
+        let [first, last] = [range.start, range.end - 1].map(|k| &self.paces[k]);
+        (last.along_m - first.along_m) / (last.time_s - first.time_s)
+    }
+
+    /// How much more likely (logarithm) the feet of some frames along the line of sight are as solved than in even motion;
+    /// `None` if they are too few.
+    pub(super) fn gain(&mut self, range: std::ops::Range<usize>) -> Option<f64> {
+        let (mut points, mut off_m) = (Vec::new(), Vec::new());
+        for k in range {
+            let Pace { time_s, feet, along_m, phase, .. } = self.paces[k];
+            let Some(feet) = feet.filter(|_| self.is_along(along_m)) else { continue };
+            let seen_m = self.route.at(along_m).along(feet.place);
+            off_m.push(seen_m - along_m - self.reach.at(along_m, phase)[0]);
+            points.push((time_s, seen_m));
+        }
+        if points.len() < LEADING {
+            return None;
+        }
+        let (_, even) = reweighted_line(&points);
+        let evenly = SCALES_M.iter().map(|scale_m| likelihood(&even, *scale_m)).fold(f64::MIN, f64::max);
+        Some((likelihood(&off_m, WALKERS_OFF_M) - evenly) / LIKE_FRAMES)
+    }
+
+    /// Whether feet and not contours show the place and phase of a frame.
+    pub(super) fn is_by_feet(&self, k: usize) -> bool {
+        self.paces.get(k).is_some_and(|pace| self.is_along(pace.along_m))
+    }
+
+    /// What the contours of the better twin show of a frame; the phase is that of the first twin.
+    pub(super) fn see(&mut self, k: usize, walk: &Walk) {
+        let best = walk.best();
+        let (Some(pace), Some(step)) = (self.paces.get_mut(k), walk.twins[best].steps.get(k)) else { return };
+        let phase = step.state.phase.position - 0.5 * best as f64;
+        // The better twin may have changed.
+        let phase = phase - (2.0 * (phase - pace.phase)).round() / 2.0;
+        (pace.along_m, pace.phase) = (step.state.along.position, phase);
+        pace.contours = Some([pace.along_m, phase]);
     }
 
     /// Number of frames up to the last one that shows the feet.
@@ -350,12 +453,16 @@ impl Frontal {
         }
     }
 
-    /// Gives both twins the place and phase of a frame.
+    /// Gives both twins the place and phase of a frame, if the feet show it.
     pub(super) fn lay(&mut self, k: usize, variances: [f64; 2], walk: &mut Walk) {
+        let is_by_feet = self.is_by_feet(k);
         for (n, twin) in walk.twins.iter_mut().enumerate() {
             let Some(step) = twin.steps.get_mut(k) else { continue };
-            step.state = self.state(k, n, variances, &step.state);
-            step.measured = self.measured(k, &step.state);
+            step.by_feet = is_by_feet;
+            if is_by_feet {
+                step.state = self.state(k, n, variances, &step.state);
+                step.measured = self.measured(k, &step.state);
+            }
         }
     }
 
@@ -363,7 +470,8 @@ impl Frontal {
     fn measured(&mut self, k: usize, state: &State) -> Option<Hypothesis> {
         let Pace { feet, along_m, phase, .. } = self.paces[k];
         let reach_m = self.reach.at(along_m, phase)[0];
-        feet.map(|feet| Hypothesis { along_m: feet.along_m - reach_m, ..state.hypothesis() })
+        let path = self.route.at(along_m);
+        feet.map(|feet| Hypothesis { along_m: path.along(feet.place) - reach_m, ..state.hypothesis() })
     }
 
     /// Solves for places and phases from an index on.
@@ -376,16 +484,22 @@ impl Frontal {
             let count = self.paces.len() - from;
             let mut arrow = Arrow::new(count, 2, 0);
             for k in 0..count {
-                let Pace { feet, along_m, phase, .. } = self.paces[from + k];
+                let Pace { feet, contours, along_m, phase, .. } = self.paces[from + k];
                 let [x, p] = [arrow.index(k, 0), arrow.index(k, 1)];
                 if from > 0 && k < 2 {
                     arrow.add_row(&[(x, 1.0)], along_m, HELD);
                     arrow.add_row(&[(p, 1.0)], phase, HELD);
                 }
+                if !self.is_along(along_m) {
+                    let Some([seen_m, seen]) = contours else { continue };
+                    arrow.add_row(&[(x, 1.0)], seen_m, 1.0 / (LIKE_FRAMES * CONTOURS_SD_M.powi(2)));
+                    arrow.add_row(&[(p, 1.0)], seen, 1.0 / (LIKE_FRAMES * CONTOURS_PHASE_SD.powi(2)));
+                    continue;
+                }
                 let Some(feet) = feet else { continue };
                 let [reach_m, by_place, by_phase] = self.reach.at(along_m, phase);
-                let variance = REACH_SD_M.powi(2) + (ROW_SD_PX * feet.row_m).powi(2);
-                let off_m = feet.along_m - along_m - reach_m;
+                let variance = REACH_SD_M.powi(2) + (ROW_SD_PX * feet.row_m()).powi(2);
+                let off_m = self.route.at(along_m).along(feet.place) - along_m - reach_m;
                 let weight = 1.0 / (1.0 + off_m * off_m / (CAUCHY_SD * CAUCHY_SD * variance));
                 let right = off_m + (1.0 + by_place) * along_m + by_phase * phase;
                 arrow.add_row(
@@ -419,10 +533,17 @@ impl Frontal {
     }
 }
 
-/// Whether a path is within `ALONG_THE_SIGHT_RAD` of the line of sight to its origin.
-fn is_along_the_sight(path: &Path, camera: &Camera) -> bool {
-    let sight = (path.origin - camera.position().truncate()).normalize_or_zero();
-    path.direction().perp_dot(sight).abs() < ALONG_THE_SIGHT_RAD.sin()
+/// The angle between a path and the line of sight to a place on it, in either direction.
+pub(super) fn off_the_sight_rad(path: &Path, along_m: f64, camera: &Camera) -> f64 {
+    let place = path.point(along_m, 0.0).truncate();
+    let sight = (place - camera.position().truncate()).normalize_or_zero();
+    path.direction().perp_dot(sight).abs().asin()
+}
+
+/// Whether who walks on a path comes nearer to the camera at a place on it.
+fn comes_nearer(path: &Path, along_m: f64, camera: &Camera) -> bool {
+    let place = path.point(along_m, 0.0).truncate();
+    path.direction().dot(camera.position().truncate() - place) > 0.0
 }
 
 /// The path on which somebody was seen at (time, place) on the ground, and the speed.
@@ -466,6 +587,7 @@ fn likelihood(off_m: &[f64], scale_m: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::decisions::HINDSIGHT_GAIN;
     use super::super::search::tests::{camera, walker};
     use super::super::walk::FrameEdges;
     use super::*;
@@ -512,6 +634,11 @@ mod tests {
         camera().ground_point(lower).unwrap().truncate()
     }
 
+    /// The same rectangle by both kinds of changes.
+    fn lowest(sighting: Option<Sighting>) -> Lowest {
+        Lowest { firm: sighting, all: sighting }
+    }
+
     fn begun(standing: &Standing) -> Option<Frontal> {
         Frontal::begin(standing, &camera(), &walker(), &CadenceRange::default())
     }
@@ -520,13 +647,16 @@ mod tests {
     fn steps_towards_the_camera_show_path_speed_and_cadence() {
         let frontal = begun(&standing(66, feet_of_steps)).unwrap();
         let beginning = frontal.beginning();
-        assert!(frontal.path.direction().dot(towards()) > 0.998, "{:?}", frontal.path);
+        assert!(frontal.route.at(0.0).direction().dot(towards()) > 0.998, "{:?}", frontal.route);
         assert!((beginning.speed_mps - SPEED_MPS).abs() < 0.06, "{beginning:?}");
         assert!((beginning.rate_hz - 0.5 / STEP_S).abs() < 0.03, "{beginning:?}");
         for pace in &frontal.paces {
             let off = 2.0 * pace.phase - pace.time_s / STEP_S;
             assert!((off - off.round()).abs() < 0.06, "{}: {off}", pace.time_s);
-            assert!((pace.along_m - frontal.path.along(MIDDLE) + 1.2 - SPEED_MPS * pace.time_s).abs() < 0.05);
+            assert!(
+                (pace.along_m - frontal.route.at(0.0).along(MIDDLE) + 1.2 - SPEED_MPS * pace.time_s).abs()
+                    < 0.05
+            );
         }
     }
 
@@ -560,19 +690,19 @@ mod tests {
         let (seen, speed_mps) = (frontal.seen(), frontal.beginning().speed_mps);
         assert_eq!(seen, 66);
         for k in 66..76 {
-            frontal.push(FRAME_S * k as f64, None);
+            frontal.push(FRAME_S * k as f64, &Lowest::default());
         }
         assert_eq!((frontal.seen(), frontal.paces.len()), (66, 76));
         let led = frontal.paces[75].along_m - frontal.paces[65].along_m;
         assert!((led - speed_mps * 10.0 * FRAME_S).abs() < 0.05, "{led}");
         for k in 76..90 {
             let sighting = frame(k, feet_of_steps(FRAME_S * k as f64)).0;
-            frontal.push(FRAME_S * k as f64, sighting.as_ref());
+            frontal.push(FRAME_S * k as f64, &lowest(sighting));
             assert!(frontal.solve(frontal.paces.len() - 60).is_some());
         }
         let last = frontal.paces[89];
         let true_m = SPEED_MPS * last.time_s - 1.2;
-        let place = frontal.path.point(last.along_m, 0.0).truncate();
+        let place = frontal.route.at(0.0).point(last.along_m, 0.0).truncate();
         assert!((place.dot(towards()) - true_m).abs() < 0.2, "{place}, {true_m}");
         // Held frames stay where they are.
         let before = frontal.paces[40];
@@ -587,16 +717,17 @@ mod tests {
         let place = |t: f64| feet_of_steps(t) + across(t);
         let mut frontal = begun(&standing(50, place)).unwrap();
         for k in 50..130 {
-            frontal.push(FRAME_S * k as f64, frame(k, place(FRAME_S * k as f64)).0.as_ref());
+            frontal.push(FRAME_S * k as f64, &lowest(frame(k, place(FRAME_S * k as f64)).0));
         }
-        let off_deg = |frontal: &Frontal| towards().angle_to(frontal.path.direction()).to_degrees().abs();
+        let off_deg =
+            |frontal: &Frontal| towards().angle_to(frontal.route.at(0.0).direction()).to_degrees().abs();
         assert!(off_deg(&frontal) > 7.0, "{}", off_deg(&frontal));
         let (renewed, variances) = frontal.on_path_of_all().unwrap();
         assert!(off_deg(&renewed) < 3.0, "{}", off_deg(&renewed));
         assert_eq!((renewed.paces.len(), variances.len()), (130, 130));
         for pace in &renewed.paces {
             let body = MIDDLE + towards() * (SPEED_MPS * pace.time_s - 1.2);
-            let off = renewed.path.point(pace.along_m, 0.0).truncate() - body;
+            let off = renewed.route.at(0.0).point(pace.along_m, 0.0).truncate() - body;
             let most_m = 0.1 + across(pace.time_s).length();
             assert!(off.length() < most_m, "{}: {off} m", pace.time_s);
         }
@@ -606,7 +737,7 @@ mod tests {
     #[test]
     fn reach_repeats_every_half_cycle_and_its_slopes_are_those_of_its_values() {
         let path = Path { origin: MIDDLE, heading_rad: towards().to_angle() };
-        let mut reach = Reach::new(&walker(), &camera(), path);
+        let mut reach = Reach::new(&walker(), &camera(), &path.into());
         for k in 0..40 {
             let (along_m, phase) = (-1.0 + 0.053 * f64::from(k), 0.037 * f64::from(k));
             let [value, by_place, by_phase] = reach.at(along_m, phase);
@@ -629,12 +760,12 @@ mod tests {
         };
         let mut frontal = begun(&standing(66, feet_of_steps)).unwrap();
         for k in 66..130 {
-            frontal.push(FRAME_S * k as f64, frame(k, spoilt(FRAME_S * k as f64)).0.as_ref());
+            frontal.push(FRAME_S * k as f64, &lowest(frame(k, spoilt(FRAME_S * k as f64)).0));
         }
         frontal.solve(0).unwrap();
         let still = ConstantVelocity::new(0.0, 0.0, 1.0, 1.0);
         let before = State { along: still, height: still, phase: still };
-        let start_m = frontal.path.along(MIDDLE) - 1.2;
+        let start_m = frontal.route.at(0.0).along(MIDDLE) - 1.2;
         for k in 0..130 {
             let pace = frontal.paces[k];
             let true_m = start_m + SPEED_MPS * pace.time_s;
@@ -659,10 +790,10 @@ mod tests {
             };
             let Some(mut frontal) = begun(&standing(66, place)) else { continue };
             for k in 66..110 {
-                frontal.push(FRAME_S * k as f64, frame(k, place(FRAME_S * k as f64)).0.as_ref());
+                frontal.push(FRAME_S * k as f64, &lowest(frame(k, place(FRAME_S * k as f64)).0));
             }
             let variances = frontal.solve(0).unwrap();
-            let start_m = frontal.path.along(MIDDLE) - 1.2;
+            let start_m = frontal.route.at(0.0).along(MIDDLE) - 1.2;
             for k in (10..100).step_by(10) {
                 let off_m = frontal.paces[k].along_m - start_m - SPEED_MPS * frontal.paces[k].time_s;
                 (sum, count) = (sum + off_m * off_m / variances[k][0], count + 1.0);
@@ -671,6 +802,112 @@ mod tests {
         let z = f64::sqrt(sum / count);
         println!("errors over stated deviations: {z:.2} of {count}");
         assert!(count >= 72.0 && (0.4..1.0).contains(&z), "{z} of {count}");
+    }
+
+    /// A way that comes towards the camera and turns across the picture: a straight line, a quarter of a circle, a line.
+    fn corner() -> Route {
+        const RADIUS_M: f64 = 1.5;
+        let turn_m = RADIUS_M * std::f64::consts::FRAC_PI_2;
+        let point = |k: i32| {
+            let along_m = 0.02 * f64::from(k);
+            let on_turn_m = along_m.clamp(3.0, 3.0 + turn_m) - 3.0;
+            let angle = on_turn_m / RADIUS_M;
+            let before = DVec2::new(0.0, -along_m.min(3.0));
+            let turned = RADIUS_M * DVec2::new(1.0 - angle.cos(), -angle.sin());
+            let after = DVec2::new((along_m - 3.0 - turn_m).max(0.0), 0.0);
+            DVec2::new(-0.3, 2.5) + before + turned + after
+        };
+        Route::through(&(0..=400).map(point).collect::<Vec<_>>(), 0.0).unwrap()
+    }
+
+    /// The lower foot of somebody on a route, where the row of its sole meets the ground below the trunk.
+    fn feet_on(route: &Route, along_m: f64, phase: f64) -> DVec2 {
+        let walker = walker();
+        let path = route.at(along_m);
+        let torso = path.point(along_m, walker.level_torso_height_m() + walker.gait.vertical_m(phase));
+        let posed = walker.pose(torso, path.heading_rad, phase);
+        let rows = [posed.right, posed.left]
+            .map(|side| camera().project_ideal(side.ankle - 0.055 * DVec3::Z).unwrap().y);
+        let pixel = DVec2::new(camera().project_ideal(torso).unwrap().x, rows[0].max(rows[1]));
+        camera().ground_point(pixel).unwrap().truncate()
+    }
+
+    /// Feet lead along the line of sight, contours beyond; both in the same cycle, and where the feet alone are seen too.
+    #[test]
+    fn feet_and_contours_show_one_way_around_a_corner() {
+        let route = corner();
+        let along = |k: usize| SPEED_MPS * FRAME_S * k as f64;
+        let cycle = |k: usize| 0.5 * FRAME_S * k as f64 / STEP_S;
+        let mut frontal = Frontal::on_route(&route, &walker(), &camera());
+        let mut turned = 0;
+        for k in 0..130 {
+            let seen = frame(k, feet_on(&route, along(k), cycle(k) + LEAD[0])).0;
+            let feet = frontal.feet_of(&lowest(seen), along(k));
+            // Places and phases start off by a little, and contours are far off where they do not count.
+            let is_across = !frontal.is_along(along(k));
+            turned += usize::from(is_across);
+            let off = if is_across { 0.0 } else { 0.2 };
+            let contours = Some([along(k) + off, cycle(k) + off]);
+            let (along_m, phase) = (along(k) + 0.1, cycle(k) + 0.05);
+            frontal.paces.push(Pace { time_s: FRAME_S * k as f64, feet, contours, along_m, phase });
+        }
+        assert!((30..100).contains(&turned), "{turned}");
+        let variances = frontal.solve(0).unwrap();
+        assert_eq!(variances.len(), 130);
+        for (k, pace) in frontal.paces.iter().enumerate() {
+            assert!((pace.along_m - along(k)).abs() < 0.08, "{k}: {} {}", pace.along_m, along(k));
+            assert!((pace.phase - cycle(k)).abs() < 0.04, "{k}: {} {}", pace.phase, cycle(k));
+        }
+    }
+
+    #[test]
+    fn frames_before_a_walk_go_on_with_its_steps_backwards_and_even_motion_does_not() {
+        let route = corner();
+        let along = |k: usize| SPEED_MPS * FRAME_S * k as f64;
+        let cycle = |k: usize| 0.5 * FRAME_S * k as f64 / STEP_S;
+        let gain = |is_walking: bool| {
+            let mut frontal = Frontal::on_route(&route, &walker(), &camera());
+            for k in 50..110 {
+                let contours = Some([along(k), cycle(k)]);
+                let (along_m, phase) = (along(k), cycle(k));
+                frontal.paces.push(Pace { time_s: FRAME_S * k as f64, feet: None, contours, along_m, phase });
+            }
+            for k in (0..50).rev() {
+                let place = match is_walking {
+                    true => feet_on(&route, along(k), cycle(k) + LEAD[0]),
+                    false => route.place(along(k) + 0.3),
+                };
+                frontal.precede(FRAME_S * k as f64, &lowest(frame(k, place).0), route.place(along(k)));
+                frontal.solve(0).unwrap();
+            }
+            if is_walking {
+                for (k, pace) in frontal.paces.iter().enumerate() {
+                    assert!((pace.along_m - along(k)).abs() < 0.1, "{k}: {} {}", pace.along_m, along(k));
+                    assert!((pace.phase - cycle(k)).abs() < 0.06, "{k}: {} {}", pace.phase, cycle(k));
+                }
+                assert!((frontal.speed_mps(0..50) - SPEED_MPS).abs() < 0.1);
+            }
+            frontal.gain(0..50).unwrap()
+        };
+        let gains = [true, false].map(gain);
+        assert!(gains[0] > 2.0 * HINDSIGHT_GAIN && gains[1] < 0.0, "{gains:?}");
+    }
+
+    #[test]
+    fn places_on_another_route_are_where_they_were() {
+        let route = corner();
+        let mut frontal = Frontal::on_route(&route, &walker(), &camera());
+        for k in 0..60 {
+            let (along_m, phase) = (0.1 * f64::from(k), 0.05 * f64::from(k));
+            let contours = Some([along_m, phase]);
+            frontal.paces.push(Pace { time_s: f64::from(k), feet: None, contours, along_m, phase });
+        }
+        let start = route.place(1.0);
+        let moved = frontal.moved_to(&route.moved(start, 1.0, 0.0, 0.0));
+        for (a, b) in frontal.paces.iter().zip(&moved.paces) {
+            assert!(route.place(a.along_m).distance(moved.route.place(b.along_m)) < 0.01);
+            assert!((b.contours.unwrap()[0] - b.along_m).abs() < 1e-9 && a.phase == b.phase);
+        }
     }
 
     #[test]

@@ -11,7 +11,7 @@
 //! Limits: several people who move as one region are one thing; somebody who is hidden for longer than [`GAP_S`] is two.
 //!
 //! Memory does not grow with the length of the stream: at most [`MOST_THINGS`] things are open and [`MOST_CLOSED`] wait
-//! for the end of a walk, each with [`MOST_SHOTS`] rectangles; [`MOST_TRAILS`] walks are remembered while things of
+//! for the end of a walk, each with [`MOST_SHOTS`] rectangles; [`MOST_WALKS`] walks are remembered while things of
 //! their time are undecided; of those who were left out, the [`MOST_LEFT_OUT`] that were seen longest are kept, and all are
 //! counted.
 
@@ -19,7 +19,7 @@ mod thing;
 
 use super::locate::LocateError;
 use crate::image::Rectangle;
-pub(super) use thing::{Hindrance, Noticed, SMALLEST_PX, Trail};
+pub(super) use thing::{Hindrance, Noticed, SMALLEST_PX, WalkBoxes};
 use thing::{Shots, Thing};
 
 /// A thing is given up after this time without it; somebody starts or ends a walk this near to it, seconds.
@@ -34,7 +34,7 @@ pub const MOST_CLOSED: usize = 256;
 /// Rectangles kept of a thing, evenly over its time.
 pub const MOST_SHOTS: usize = 64;
 /// Walks remembered for things that are undecided.
-pub const MOST_TRAILS: usize = 128;
+pub const MOST_WALKS: usize = 128;
 /// Those who were left out that are kept, the ones that were seen longest.
 pub const MOST_LEFT_OUT: usize = 100;
 /// Rectangles in the result.
@@ -181,7 +181,7 @@ impl LeftOut {
 pub(super) struct Unfollowed {
     open: Vec<Thing>,
     closed: Vec<Thing>,
-    trails: Vec<Trail>,
+    walks: Vec<WalkBoxes>,
     left_out: Vec<LeftOut>,
     count: usize,
 }
@@ -237,17 +237,17 @@ impl Unfollowed {
     }
 
     /// Notes a walk: what belongs to it is not left out.
-    pub fn followed(&mut self, trail: Trail) {
-        self.trails.push(trail);
-        let excess = self.trails.len().saturating_sub(MOST_TRAILS);
-        self.trails.drain(..excess);
+    pub fn followed(&mut self, walk_boxes: WalkBoxes) {
+        self.walks.push(walk_boxes);
+        let excess = self.walks.len().saturating_sub(MOST_WALKS);
+        self.walks.drain(..excess);
     }
 
     /// Notes a walk that was none after all.
-    pub fn withdrawn(&mut self, trail: Trail, reason: Reason) {
-        let mut own = self.open.extract_if(.., |thing| thing.belongs_to(&trail)).collect::<Vec<_>>();
-        own.extend(self.closed.extract_if(.., |thing| thing.belongs_to(&trail)));
-        let mut thing = Thing::of_walk(&trail);
+    pub fn withdrawn(&mut self, walk_boxes: WalkBoxes, reason: Reason) {
+        let mut own = self.open.extract_if(.., |thing| thing.belongs_to(&walk_boxes)).collect::<Vec<_>>();
+        own.extend(self.closed.extract_if(.., |thing| thing.belongs_to(&walk_boxes)));
+        let mut thing = Thing::of_walk(&walk_boxes);
         own.iter().for_each(|other| thing.join(other));
         thing.refuse(reason);
         self.open.push(thing);
@@ -256,10 +256,10 @@ impl Unfollowed {
     /// Decides on the things that are gone and whose walks have ended: `since_s` is when the first walk that goes on
     /// began, infinity if none does.
     pub fn settle(&mut self, since_s: f64, start_frames: usize) {
-        let trails = &self.trails;
+        let walks = &self.walks;
         let decided = self.closed.extract_if(.., |thing| thing.shots.last.time_s + GAP_S < since_s);
         let left = decided.filter(|thing| {
-            thing.is_notable(start_frames) && !trails.iter().any(|trail| thing.belongs_to(trail))
+            thing.is_notable(start_frames) && !walks.iter().any(|walk_boxes| thing.belongs_to(walk_boxes))
         });
         let left: Vec<LeftOut> = left.map(|thing| thing.left_out()).collect();
         self.count += left.len();
@@ -270,14 +270,14 @@ impl Unfollowed {
         }
         let things = self.open.iter().chain(&self.closed);
         let first_s = things.map(|thing| thing.shots.first().time_s).fold(f64::INFINITY, f64::min);
-        self.trails.retain(|trail| trail.shots.last.time_s + 2.0 * GAP_S >= first_s.min(since_s));
+        self.walks.retain(|walk_boxes| walk_boxes.shots.last.time_s + 2.0 * GAP_S >= first_s.min(since_s));
     }
 
     /// Ends the stream or the view, after the walks.
     pub fn finish(&mut self, start_frames: usize) {
         self.closed.append(&mut self.open);
         self.settle(f64::INFINITY, start_frames);
-        self.trails.clear();
+        self.walks.clear();
     }
 }
 

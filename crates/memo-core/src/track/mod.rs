@@ -15,6 +15,7 @@ pub mod fit;
 mod frontal;
 pub(crate) mod gait_parameters;
 pub mod height;
+mod hindsight;
 pub mod left_out;
 pub mod locate;
 pub mod normal_gait;
@@ -31,6 +32,7 @@ pub mod start;
 pub mod steady;
 pub mod swap;
 pub(crate) mod tracker;
+mod trail;
 pub mod treadmill;
 pub mod walk;
 

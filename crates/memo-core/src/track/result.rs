@@ -14,7 +14,7 @@ use super::height::{BodyHeight, HeightSource};
 use super::route::Route;
 use super::search::{Hypothesis, Scene};
 use super::start::{Direction, StartReport};
-use super::walk::{State, Step, Walk, WalkOptions};
+use super::walk::{Step, Walk, WalkOptions};
 use crate::calibrate::TiltEstimate;
 use crate::estimate::kalman::{ConstantVelocity, FilterOptions, Noise, smooth};
 use crate::model::{Camera, PosedBody, Posture, SideJoints, Walker};
@@ -187,12 +187,14 @@ impl TrackedWalk {
 
     fn tracked_rows(&self, steps: &[Step]) -> Vec<Row> {
         let p_swapped = self.p_swapped();
-        if self.is_frontal {
-            let of = |s: &State| [s.along, s.height, s.phase].map(|state| (state, 1.0));
-            return steps.iter().map(|step| self.row(step, p_swapped, of(&step.state))).collect();
-        }
         let coordinates = coordinates(steps, &self.options.filter);
-        let at = |k: usize| coordinates.each_ref().map(|c| (c.smoothed[k], c.sd_scale));
+        let at = |k: usize| match steps[k].by_feet {
+            // The feet of all frames show it.
+            true => {
+                [steps[k].state.along, steps[k].state.height, steps[k].state.phase].map(|state| (state, 1.0))
+            }
+            false => coordinates.each_ref().map(|c| (c.smoothed[k], c.sd_scale)),
+        };
         steps.iter().enumerate().map(|(k, step)| self.row(step, p_swapped, at(k))).collect()
     }
 
@@ -259,7 +261,7 @@ impl TrackedWalk {
         let eye = self.camera.position().truncate();
         let off_axis = (hypothesis.along_m - scene.path.along(eye)).abs();
         let distance = scene.path.distance(eye);
-        let [along_sd, across_sd] = match self.is_frontal {
+        let [along_sd, across_sd] = match step.by_feet {
             true => [sd(along, self.depth_sd_m), ACROSS_SD_M],
             false => [sd(along, COMMON_SD[0]).hypot(self.depth_sd_m * off_axis / distance), self.depth_sd_m],
         };
@@ -277,7 +279,7 @@ impl TrackedWalk {
                 forward.x.hypot(across.x),
                 forward.y.hypot(across.y),
                 sd(height, COMMON_SD[1]).hypot(self.height.assumed_scale_sd() * posed.torso_centre.z),
-                sd(phase, if self.is_frontal { COMMON_PHASE_SD } else { COMMON_SD[2] }),
+                sd(phase, if step.by_feet { COMMON_PHASE_SD } else { COMMON_SD[2] }),
             ],
             posture: self.walk.walker.gait.posture(hypothesis.phase, &self.walk.walker.style),
             measured: None,
@@ -295,7 +297,7 @@ impl TrackedWalk {
         if self.direction() == Direction::Backward {
             return Vec::new();
         }
-        let rows = self.rows();
+        let (rows, steps) = (self.rows(), self.steps());
         if let Some(fit) = self.fitted() {
             let event = |c: &Contact| Event {
                 time_s: c.time_s,
@@ -303,8 +305,16 @@ impl TrackedWalk {
                 kind: c.kind,
                 side: c.side,
             };
-            return fit.contacts.iter().map(event).collect();
+            let mut events: Vec<Event> = fit.contacts.iter().map(event).collect();
+            events.extend(self.passed(&rows, |k| steps[k].by_feet));
+            events.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
+            return events;
         }
+        self.passed(&rows, |_| true)
+    }
+
+    /// Events at which the phase passes its mark between two rows of a kind, in order of time.
+    fn passed(&self, rows: &[Row], is_of_kind: impl Fn(usize) -> bool) -> Vec<Event> {
         let marks = [
             (0.0, EventKind::HeelStrike, Side::Right),
             (0.5, EventKind::HeelStrike, Side::Left),
@@ -312,7 +322,7 @@ impl TrackedWalk {
             (TOE_OFF_PHASE - 0.5, EventKind::ToeOff, Side::Left),
         ];
         let mut events = Vec::new();
-        for pair in rows.windows(2) {
+        for (_, pair) in rows.windows(2).enumerate().filter(|(k, _)| is_of_kind(*k) && is_of_kind(k + 1)) {
             for (phase, kind, side) in marks {
                 events.extend(crossing(&pair[0], &pair[1], phase).map(|t| Event {
                     time_s: pair[0].time_s + t * (pair[1].time_s - pair[0].time_s),

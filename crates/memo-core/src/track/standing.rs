@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 const MISSED_FRAMES: usize = 3;
 
 /// Frames in which something stays in one place.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Standing {
     pub(super) kept: Vec<(Option<Sighting>, FrameEdges)>,
     pub(super) pieces: Vec<Piece>,
@@ -62,6 +62,15 @@ impl Standing {
         let first = self.kept.first().map_or(usize::MAX, |(_, edges)| edges.frame);
         self.feet.retain(|frame, _| *frame >= first);
         self
+    }
+
+    /// Without the frames from this one on; nothing if they do not lead to it.
+    pub(super) fn before(mut self, frame: usize) -> Self {
+        self.kept.retain(|(_, edges)| edges.frame < frame);
+        self.pieces.retain(|piece| piece.frame < frame);
+        self.feet.retain(|seen, _| *seen < frame);
+        let is_left = self.kept.last().is_none_or(|(_, edges)| edges.frame + MISSED_FRAMES < frame);
+        if is_left { Self::default() } else { self }
     }
 
     /// The frames of a walk, and those before and in between that the walk does not have.

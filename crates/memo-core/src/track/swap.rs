@@ -40,14 +40,18 @@ impl SwapModel {
 /// The margin m = (chosen - other) / max is normal about ±mu with variance v = person² + glimpse² / n, where n is
 /// the number of independent glimpses in `duration_s`, in which the person was wholly visible; then log odds = 2 mu m / v.
 pub fn swap_probability(chosen: f64, other: f64, duration_s: f64, model: &SwapModel) -> f64 {
+    1.0 / (1.0 + log_odds(chosen, other, duration_s, model).exp())
+}
+
+/// The log odds of the hypothesis with the summed similarity `chosen` against the one with `other`.
+pub(super) fn log_odds(chosen: f64, other: f64, duration_s: f64, model: &SwapModel) -> f64 {
     let top = chosen.max(other);
     if top <= 0.0 {
-        return 0.5;
+        return 0.0;
     }
     let glimpses = (duration_s / model.glimpse_s).max(1.0);
     let variance = model.person_sd.powi(2) + model.glimpse_sd.powi(2) / glimpses;
-    let log_odds = 2.0 * model.margin * (chosen - other) / top / variance;
-    1.0 / (1.0 + log_odds.exp())
+    2.0 * model.margin * (chosen - other) / top / variance
 }
 
 #[cfg(test)]

@@ -52,7 +52,7 @@ use crate::model::{Body, Camera, EllipticCylinder};
 use glam::DVec2;
 use std::collections::BTreeMap;
 use thiserror::Error;
-use unfollowed::{Moving, trail, with_small_ones};
+use unfollowed::{Moving, walk_boxes, with_small_ones};
 
 /// Why tracking stopped with an error.
 #[derive(Debug, Clone, PartialEq, Error)]
@@ -108,6 +108,8 @@ pub const LONGEST_WALK: usize = 20_000;
 const MOST_CANDIDATES: usize = 3;
 /// A walk that is over is returned after this time, in which somebody may start where it ended, seconds.
 const FADING_S: f64 = 1.0;
+/// The same with a calibrated camera: the feet of somebody who turned into the line of sight show a walk later.
+const FADING_BY_FEET_S: f64 = 3.0;
 /// A box belongs to somebody who is followed if it overlaps the body's box by this, intersection over union.
 const OWN_BOX: f64 = 0.3;
 /// Edges are searched this far around the predicted body, pixels.
@@ -430,11 +432,11 @@ impl Tracker {
                 active.pieces.push(piece.with_crown(sighting.as_ref()));
                 self.backdrop.occupy(evidence.frame, own.window);
             }
-            if let Some(frontal) = &active.frontal {
-                let all = || sighting.and_then(|sighting| feet(&sighting, evidence, &self.options));
-                let seen = if frontal.by_all { all() } else { sighting };
-                active.pace(edges.time_s, seen.as_ref());
+            if self.options.camera.is_some() && !active.is_on_treadmill {
+                let feet = sighting.and_then(|sighting| feet(&sighting, evidence, &self.options));
+                active.feet.extend(feet.map(|feet| (evidence.frame, feet)));
             }
+            active.pace(sighting);
             active.kept.push((sighting, edges));
             self.settle(k);
             self.people[k].turn(&self.options);
@@ -454,7 +456,15 @@ impl Tracker {
             self.people.insert(k, active);
         }
         self.people[k].settle(&self.backdrop, &self.options);
-        self.standing = Standing::default();
+        let standing = std::mem::take(&mut self.standing);
+        let active = &mut self.people[k];
+        active.earlier = standing.before(active.kept.first().map_or(0, |(_, edges)| edges.frame));
+        let active = self.people.remove(k);
+        let (person, joined) = (active.person, self.gone_on(&active));
+        if joined.as_ref().is_some_and(|joined| joined.person != person) {
+            self.identities.withdraw(person);
+        }
+        self.people.insert(k, joined.unwrap_or(active));
     }
 
     /// Ends walks that are over. On a wrong path a walk can seem to be over, so a turn is looked for first.
@@ -467,9 +477,22 @@ impl Tracker {
             active.settled && (active.is_hidden() || active.is_over() && !active.goes_on(options))
         };
         self.fading.extend(self.people.extract_if(.., is_over).map(|active| (time_s, active)));
-        let is_gone = |(end_s, _): &mut (f64, Active)| time_s - *end_s > FADING_S;
+        let fading_s = if self.options.camera.is_some() { FADING_BY_FEET_S } else { FADING_S };
+        let is_gone = |(end_s, _): &mut (f64, Active)| time_s - *end_s > fading_s;
         ended.extend(self.fading.extract_if(.., is_gone).map(|(_, active)| active));
         ended.into_iter().for_each(|active| self.end_walk(active));
+    }
+
+    /// The walk that seemed to be over but went on as a later one, which the feet in between and since show.
+    fn gone_on(&mut self, later: &Active) -> Option<Active> {
+        let options = &self.options;
+        let (n, joined) = self
+            .fading
+            .iter()
+            .enumerate()
+            .find_map(|(n, (_, old))| Some((n, old.joined(later, options)?)))?;
+        self.fading.remove(n);
+        Some(joined)
     }
 
     /// The number of somebody who starts to be followed. A walk can leave its person, who turns or slows. Who starts
@@ -706,15 +729,18 @@ impl Tracker {
     fn end_walk(&mut self, active: Active) {
         let mut active = if active.settled { active } else { self.begun_on_the_spot(active) };
         active.settle(&self.backdrop, &self.options);
+        // On a smoothed route, the feet would walk on.
+        let standing = active.standing();
+        active.begin_earlier(&self.options);
         active.turned(&self.options);
         active.pace_all();
         active.straighten(&self.options.walk);
-        let standing = active.standing();
+        let standing = standing.or_else(|| active.standing());
         active.trim();
         let started = self.started.remove(&active.person);
-        let trail = trail(&active, started);
+        let walk_boxes = walk_boxes(&active, started);
         if !active.is_walk() {
-            self.withdraw(&active, trail, Reason::NotWalking);
+            self.withdraw(&active, walk_boxes, Reason::NotWalking);
             return;
         }
         let p_swapped = active.p_swapped(&self.options);
@@ -727,14 +753,15 @@ impl Tracker {
             let is_brief = is_left_over && is_short;
             let frames = active.steps().len();
             let reason = if is_brief { Reason::TooBrief { frames } } else { Reason::NotWalking };
-            self.withdraw(&active, trail, reason);
+            self.withdraw(&active, walk_boxes, reason);
             return;
         }
-        trail.into_iter().for_each(|trail| self.unfollowed.followed(trail));
+        walk_boxes.into_iter().for_each(|walk_boxes| self.unfollowed.followed(walk_boxes));
         if let Some(sign) = standing.or_else(|| active.sign()) {
             self.identities.end(active.person, sign);
         }
         let height = active.height_by(fit.as_ref().and_then(|fit| fit.as_ref().ok()));
+        let is_frontal = active.is_frontal();
         self.finished.push(TrackedWalk {
             person: active.person,
             camera_turns: active.turns(self.stream.camera_motions()),
@@ -748,7 +775,7 @@ impl Tracker {
             tilt: active.tilt,
             gait_speed_mps: active.gait_speed_mps,
             is_on_treadmill: active.is_on_treadmill,
-            is_frontal: active.frontal.is_some(),
+            is_frontal,
             fit,
             options: self.options.walk,
         });

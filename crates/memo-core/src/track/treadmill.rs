@@ -128,6 +128,8 @@ impl Spot<'_> {
             settled: false,
             pieces: standing.pieces,
             is_on_treadmill: true,
+            feet: standing.feet,
+            earlier: Standing::default(),
             frontal: None,
             early: Some(self.backdrop.clone()),
         })

@@ -141,6 +141,8 @@ pub struct Step {
     pub visible: f32,
     /// True if other people were near.
     pub shared: bool,
+    /// True if the state is what the feet show of somebody who walks along the line of sight.
+    pub by_feet: bool,
     /// Where the twin was searched.
     pub look: Look,
 }
@@ -351,6 +353,7 @@ fn match_frame(edges: &FrameEdges, scene: &Scene<'_>, predicted: &State, options
         similarity,
         visible,
         shared: edges.shared,
+        by_feet: false,
         look,
     }
 }
@@ -448,6 +451,7 @@ mod tests {
             similarity,
             visible: 1.0,
             shared: false,
+            by_feet: false,
             look,
         }
     }

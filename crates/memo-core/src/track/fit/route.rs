@@ -32,21 +32,25 @@ const POINTS_M: f64 = 0.1;
 const STEPS: usize = 2;
 
 /// The route of somebody who turned, moved until the contours lie on the edges, and the frames on it; a straight route
-/// as it is.
+/// as it is. The way goes from one of `ends_m` to the other.
 pub(crate) fn fitted_route(
     camera: &Camera,
     walker: &Walker,
     route: &Route,
+    mut ends_m: [f64; 2],
     frames: &mut [FitFrame],
     options: &FitOptions,
 ) -> Route {
     let mut route = route.clone();
     for _ in 0..if route.is_straight() { 0 } else { STEPS } {
-        let Some(next) = Problem::new(camera, walker, &route, frames, options).moved_route() else { break };
+        let Some(next) = Problem::new(camera, walker, &route, frames, options).moved_route(ends_m) else {
+            break;
+        };
         for frame in frames.iter_mut() {
             let along_m = frame.start.along_m;
             frame.start.along_m = next.along(route.place(along_m), along_m);
         }
+        ends_m = ends_m.map(|along_m| next.along(route.place(along_m), along_m));
         route = next;
     }
     route
@@ -54,7 +58,7 @@ pub(crate) fn fitted_route(
 
 impl Problem<'_> {
     /// The route after one step; `None` if the contours do not determine one.
-    fn moved_route(&self) -> Option<Route> {
+    fn moved_route(&self, whole_m: [f64; 2]) -> Option<Route> {
         let (unknowns, _) = self.best_start(0.0)?;
         let ends = [0, unknowns.frames.len() - 1].map(|k| self.along(&unknowns.frames[k]));
         let length_m = ends[1] - ends[0];
@@ -72,15 +76,17 @@ impl Problem<'_> {
         }
         // 2. The route moved by them.
         let coefficients = most_probable(normal, &right, length_m)?;
-        let count = (length_m.abs() / POINTS_M).ceil() as usize;
+        let [from_m, to_m] =
+            if length_m > 0.0 { [whole_m[0].min(ends[0]), whole_m[1].max(ends[1])] } else { ends };
+        let count = ((to_m - from_m).abs() / POINTS_M).ceil() as usize;
         let point = |k: usize| {
-            let along_m = ends[0] + length_m * k as f64 / count as f64;
+            let along_m = from_m + (to_m - from_m) * k as f64 / count as f64;
             let left_m: f64 =
                 sideways(along_m, ends).iter().zip(&coefficients).map(|(of, c)| of[0] * c).sum();
             let tangent = self.route().at(along_m);
             tangent.point(along_m, 0.0).truncate() + left_m * tangent.direction().perp()
         };
-        Route::through(&(0..=count).map(point).collect::<Vec<_>>(), ends[0])
+        Route::through(&(0..=count).map(point).collect::<Vec<_>>(), from_m)
     }
 
     /// Normal equations of the coefficients in one frame.

@@ -101,6 +101,7 @@ fn tracked(measured: &[Measured], path: Path, direction: Direction) -> TrackedWa
             similarity: 0.5,
             visible: 1.0,
             shared: false,
+            by_feet: false,
             look,
         }
     };

@@ -32,21 +32,21 @@ fn left_out_of(frames: usize, regions: impl Fn(usize) -> Vec<Noticed>) -> Vec<Le
 fn left_out_beside(
     frames: usize,
     regions: impl Fn(usize) -> Vec<Noticed>,
-    trail: Option<Trail>,
+    walk_boxes: Option<WalkBoxes>,
 ) -> Vec<LeftOut> {
     let mut unfollowed = Unfollowed::default();
     for frame in 0..frames {
         unfollowed.notice(frame, 0.04 * frame as f64, &regions(frame));
     }
-    trail.into_iter().for_each(|trail| unfollowed.followed(trail));
+    walk_boxes.into_iter().for_each(|walk_boxes| unfollowed.followed(walk_boxes));
     unfollowed.finish(START_FRAMES);
     unfollowed.left_out()
 }
 
 /// The walk of [`walking`] in these frames, which started in its thirteenth.
-fn trail(frames: std::ops::Range<usize>) -> Trail {
+fn walk_boxes(frames: std::ops::Range<usize>) -> WalkBoxes {
     let started = frames.start + START_FRAMES - 1;
-    Trail::new(frames.map(|frame| shot(frame, walking(frame))), Some(started)).unwrap()
+    WalkBoxes::new(frames.map(|frame| shot(frame, walking(frame))), Some(started)).unwrap()
 }
 
 fn reasons(left_out: &[LeftOut]) -> Vec<&'static str> {
@@ -141,7 +141,7 @@ fn what_does_not_walk_may_be_too_wide_too_small_or_beside_somebody() {
 
 #[test]
 fn what_belongs_to_somebody_who_is_followed_is_not_left_out() {
-    let walk = || Some(trail(30..60));
+    let walk = || Some(walk_boxes(30..60));
     let cut_off = |frame: usize| vec![hindered(walking(frame), Hindrance::CutOff)];
     let within = |frames: std::ops::Range<usize>| {
         let there = |frame: usize| if frames.contains(&frame) { cut_off(frame) } else { vec![] };
@@ -160,10 +160,10 @@ fn what_belongs_to_somebody_who_is_followed_is_not_left_out() {
         70..80 => vec![hindered(boxed(60 + 4 * frame, 110, 20, 180), Hindrance::CutOff)],
         _ => vec![],
     };
-    assert!(left_out_beside(90, leaving, Some(trail(0..90))).is_empty());
+    assert!(left_out_beside(90, leaving, Some(walk_boxes(0..90))).is_empty());
     assert_eq!(left_out_beside(90, leaving, None).len(), 1);
     let beside = |frame: usize| vec![Noticed { beside: true, ..seen(boxed(50 + 4 * frame, 105, 40, 190)) }];
-    let all_along = Some(trail(0..90));
+    let all_along = Some(walk_boxes(0..90));
     let found = left_out_beside(90, |frame| if frame >= 13 { beside(frame) } else { vec![] }, all_along);
     assert_eq!(reasons(&found), ["beside somebody"], "as tall as the one who is followed");
 }
@@ -174,7 +174,7 @@ fn a_walk_that_was_none_is_left_out_with_what_was_seen_before_it() {
     for frame in 0..30 {
         unfollowed.notice(frame, 0.04 * frame as f64, &[hindered(walking(frame), Hindrance::CutOff)]);
     }
-    unfollowed.withdrawn(trail(18..60), Reason::NotWalking);
+    unfollowed.withdrawn(walk_boxes(18..60), Reason::NotWalking);
     unfollowed.finish(START_FRAMES);
     let found = unfollowed.left_out();
     assert_eq!(reasons(&found), ["not walking"]);
@@ -190,23 +190,23 @@ fn a_thing_waits_for_the_end_of_the_walks_of_its_time() {
         unfollowed.settle(0.8, START_FRAMES);
     }
     assert_eq!(unfollowed.count(), 0, "a walk that began in frame 20 goes on");
-    unfollowed.followed(trail(20..80));
+    unfollowed.followed(walk_boxes(20..80));
     unfollowed.settle(f64::INFINITY, START_FRAMES);
-    assert_eq!((unfollowed.count(), unfollowed.trails.len()), (0, 0));
+    assert_eq!((unfollowed.count(), unfollowed.walks.len()), (0, 0));
 }
 
 #[test]
-fn a_trail_is_where_the_person_was_and_shortly_before_and_after() {
-    let trail = trail(25..75);
+fn the_box_of_a_walk_is_where_the_person_was_and_shortly_before_and_after() {
+    let walk_boxes = walk_boxes(25..75);
     for frame in [1usize, 10, 25, 40, 74, 90, 99] {
-        let at = trail.at(0.04 * frame as f64).unwrap();
+        let at = walk_boxes.at(0.04 * frame as f64).unwrap();
         let true_box = walking(frame).sides(0.0);
         assert!(
             (at.left - true_box.left).abs() < 1e-6 && (at.right - true_box.right).abs() < 1e-6,
             "{frame}"
         );
     }
-    assert!(trail.at(-0.1).is_none() && trail.at(0.04 * 101.0).is_none());
+    assert!(walk_boxes.at(-0.1).is_none() && walk_boxes.at(0.04 * 101.0).is_none());
 }
 
 #[test]
@@ -221,10 +221,10 @@ fn memory_is_bounded() {
         unfollowed.notice(frame, 0.04 * frame as f64, shown);
         unfollowed.settle(if frame < 2000 { 0.0 } else { f64::INFINITY }, START_FRAMES);
         if frame % 10 == 0 {
-            unfollowed.followed(trail(frame..frame + 20));
+            unfollowed.followed(walk_boxes(frame..frame + 20));
         }
         assert!(unfollowed.open.len() <= MOST_THINGS && unfollowed.closed.len() <= MOST_CLOSED);
-        assert!(unfollowed.trails.len() <= MOST_TRAILS && unfollowed.left_out.len() <= MOST_LEFT_OUT);
+        assert!(unfollowed.walks.len() <= MOST_WALKS && unfollowed.left_out.len() <= MOST_LEFT_OUT);
         assert!(unfollowed.open.iter().all(|thing| thing.shots.kept.len() <= MOST_SHOTS));
     }
     unfollowed.finish(START_FRAMES);

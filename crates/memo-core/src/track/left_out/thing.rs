@@ -108,20 +108,20 @@ impl Shots {
 
 /// Where somebody was in the frames of a walk.
 #[derive(Debug, Clone)]
-pub struct Trail {
+pub struct WalkBoxes {
     pub shots: Shots,
     /// The first frame in which somebody else can be told from the person: until the walk is started, after its first
     /// frames, its regions are those of a candidate.
     told_apart: usize,
 }
 
-impl Trail {
+impl WalkBoxes {
     /// From the frames in order, of a walk that was started in a frame, if it was; `None` without any.
     pub fn new(mut shots: impl Iterator<Item = Shot>, started: Option<usize>) -> Option<Self> {
-        let mut trail = Shots::new(shots.next()?, MOST_STEPS);
-        shots.for_each(|shot| trail.push(shot));
+        let mut walk_boxes = Shots::new(shots.next()?, MOST_STEPS);
+        shots.for_each(|shot| walk_boxes.push(shot));
         let told_apart = started.map_or(usize::MAX, |frame| frame + 1);
-        Some(Self { shots: trail, told_apart })
+        Some(Self { shots: walk_boxes, told_apart })
     }
 
     /// The box at a time, extrapolated for up to [`GAP_S`].
@@ -185,8 +185,9 @@ impl Thing {
     }
 
     /// What was followed in a walk that was none.
-    pub fn of_walk(trail: &Trail) -> Self {
-        let shots = Shots { seen: trail.shots.seen, ..Shots::thinned(trail.shots.all(), MOST_SHOTS) };
+    pub fn of_walk(walk_boxes: &WalkBoxes) -> Self {
+        let shots =
+            Shots { seen: walk_boxes.shots.seen, ..Shots::thinned(walk_boxes.shots.all(), MOST_SHOTS) };
         Self::new(shots)
     }
 
@@ -251,17 +252,17 @@ impl Thing {
 
     /// True if it belongs to somebody: while both are there, and shortly before and after, it is mostly in that person's
     /// box; as tall a region that is there all the time is somebody else, beside or behind.
-    pub fn belongs_to(&self, trail: &Trail) -> bool {
+    pub fn belongs_to(&self, walk_boxes: &WalkBoxes) -> bool {
         let (mut within, mut apart, mut tall) = (0, 0, 0);
         for shot in self.shots.all() {
-            let Some(own) = trail.at(shot.time_s) else { continue };
+            let Some(own) = walk_boxes.at(shot.time_s) else { continue };
             let margin = EXPLAINED * (own.bottom - own.top);
             let at = middle(&shot.rectangle);
             let is_within = (own.left - margin..=own.right + margin).contains(&at.x)
                 && (own.top - margin..=own.bottom + margin).contains(&at.y);
             *(if is_within { &mut within } else { &mut apart }) += 1;
             let is_tall = shot.rectangle.height() as f64 >= AS_TALL * (own.bottom - own.top);
-            let is_followed = (trail.told_apart..=trail.shots.last.frame).contains(&shot.frame);
+            let is_followed = (walk_boxes.told_apart..=walk_boxes.shots.last.frame).contains(&shot.frame);
             tall += usize::from(is_within && is_tall && is_followed);
         }
         // Of somebody who leaves the image, the part at its border is as tall.

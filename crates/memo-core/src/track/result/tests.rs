@@ -52,6 +52,7 @@ fn followed(path: Path, frames: &[(f64, Option<Hypothesis>)], options: WalkOptio
             similarity,
             visible: 1.0,
             shared: false,
+            by_feet: false,
             look,
         }
     };

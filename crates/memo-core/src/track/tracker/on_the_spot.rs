@@ -8,6 +8,7 @@ use super::*;
 
 /// A start looks at so many seconds at most.
 const LONGEST_S: f64 = 4.0;
+
 /// Feet show a walk towards the camera after three steps.
 const SHORTEST_S: f64 = 1.5;
 
@@ -44,8 +45,11 @@ impl Tracker {
         match begun.or_else(|standing| self.begun_along_the_sight(standing, size, next)) {
             Ok(mut active) => {
                 self.candidates.clear();
-                active.person = self.identified(&active);
-                self.started.insert(active.person, evidence.frame);
+                match self.gone_on(&active) {
+                    Some(joined) => active = joined,
+                    None => active.person = self.identified(&active),
+                }
+                self.started.entry(active.person).or_insert(evidence.frame);
                 self.people.push(active);
             }
             Err(standing) if standing.lasts_s() < LONGEST_S => self.standing = standing,

@@ -239,7 +239,17 @@ fn step(frame: usize, along_m: f64, speed_mps: f64) -> Step {
         best,
         path: PATH,
     };
-    Step { frame, time_s, state, measured: Some(best), similarity: 0.5, visible: 1.0, shared: false, look }
+    Step {
+        frame,
+        time_s,
+        state,
+        measured: Some(best),
+        similarity: 0.5,
+        visible: 1.0,
+        shared: false,
+        by_feet: false,
+        look,
+    }
 }
 
 /// A tracker that has followed a person through `count` frames; the person is now at x metres.
@@ -267,6 +277,8 @@ fn following(count: usize, along_m: f64, speed_mps: f64) -> Tracker {
         pieces: Vec::new(),
         is_on_treadmill: false,
         early: None,
+        feet: BTreeMap::new(),
+        earlier: Standing::default(),
         frontal: None,
     });
     tracker
@@ -309,9 +321,9 @@ fn who_stands_still_is_let_go_once_the_path_is_known() {
         tracker.people.first_mut().unwrap().settled = turned;
         tracker.advance(&evidence(60, &[])).unwrap();
         assert_eq!(tracker.people.is_empty(), turned);
-        (61..86).for_each(|k| tracker.advance(&evidence(k, &[])).unwrap());
+        (61..135).for_each(|k| tracker.advance(&evidence(k, &[])).unwrap());
         assert!(tracker.take_finished().is_empty(), "somebody may start there");
-        tracker.advance(&evidence(86, &[])).unwrap();
+        tracker.advance(&evidence(136, &[])).unwrap();
         assert_eq!(tracker.take_finished().len(), usize::from(turned));
         assert_eq!(tracker.seek_report().refused_starts, 0);
     }

@@ -1,6 +1,6 @@
 //! What the tracker notes of those who move and are not followed.
 
-use super::super::left_out::{Noticed, SMALLEST_PX, Shot, Trail};
+use super::super::left_out::{Noticed, SMALLEST_PX, Shot, WalkBoxes};
 use super::*;
 use crate::image::Region;
 
@@ -31,14 +31,14 @@ pub(super) fn with_small_ones(group: &GroupOptions) -> GroupOptions {
 }
 
 /// Where somebody was in the frames of a walk that was started in a frame, if it was.
-pub(super) fn trail(active: &Active, started: Option<usize>) -> Option<Trail> {
+pub(super) fn walk_boxes(active: &Active, started: Option<usize>) -> Option<WalkBoxes> {
     let shot = |step: &super::super::walk::Step| {
         let hypothesis = step.state.hypothesis();
         let body = active.scene(hypothesis.along_m).pose(&hypothesis).cylinders;
         let rectangle = body_rectangle(&active.camera, &body)?;
         Some(Shot { frame: step.frame, time_s: step.time_s, rectangle })
     };
-    Trail::new(active.steps().iter().filter_map(shot), started)
+    WalkBoxes::new(active.steps().iter().filter_map(shot), started)
 }
 
 /// The rectangle of a body in the image; `None` if it is outside.
@@ -90,9 +90,9 @@ impl Tracker {
     }
 
     /// Takes a walk back that was none.
-    pub(super) fn withdraw(&mut self, active: &Active, trail: Option<Trail>, reason: Reason) {
+    pub(super) fn withdraw(&mut self, active: &Active, walk_boxes: Option<WalkBoxes>, reason: Reason) {
         self.report.refused_starts += 1;
         self.identities.withdraw(active.person);
-        trail.into_iter().for_each(|trail| self.unfollowed.withdrawn(trail, reason));
+        walk_boxes.into_iter().for_each(|walk_boxes| self.unfollowed.withdrawn(walk_boxes, reason));
     }
 }
