@@ -66,7 +66,7 @@ pub(super) struct Given<'a> {
 impl Candidate {
     /// True if a rectangle may enclose the same thing as the last one.
     pub fn is_at(&self, rectangle: &Rectangle) -> bool {
-        self.seen.last().is_none_or(|last| same_person(&last.sighting.rectangle, rectangle))
+        self.last_rectangle().is_none_or(|last| same_person(&last, rectangle))
     }
 
     /// Where it was last seen.
@@ -76,13 +76,12 @@ impl Candidate {
 
     /// Overlap of a rectangle with the last one, intersection over union.
     pub fn overlap(&self, rectangle: &Rectangle) -> f64 {
-        let last = self.seen.last().map(|last| last.sighting.rectangle.sides(0.0));
-        last.map_or(0.0, |last| last.overlap(&rectangle.sides(0.0)))
+        self.last_rectangle().map_or(0.0, |last| last.sides(0.0).overlap(&rectangle.sides(0.0)))
     }
 
     /// True if it was last seen in a part of the image.
     pub fn is_in(&self, window: &Rectangle) -> bool {
-        self.seen.last().is_some_and(|last| last.sighting.rectangle.gap(window) == [0, 0])
+        self.last_rectangle().is_some_and(|last| last.gap(window) == [0, 0])
     }
 
     pub fn add(&mut self, seen: Seen) {
@@ -103,11 +102,11 @@ impl Candidate {
     /// 3. Both twins followed through the start frames.
     pub fn begin(&self, given: &Given<'_>) -> Result<Active, Reason> {
         let options = given.options;
-        let sightings = self.sightings();
+        let mut sightings: Vec<Sighting> = self.seen.iter().map(|seen| seen.sighting).collect();
         if feet_cut_off(&sightings, given.size[1] as usize) {
             return Err(Reason::CutOff);
         }
-        let sightings = self.with_hidden_feet(sightings);
+        self.uncover_feet(&mut sightings);
         let height = start_height(options, given.height_m, given.camera, &sightings).on_scale(given.scale_sd);
         if options.treadmill == Some(true) {
             let Entered { course, .. } = Entered::new(&sightings, given, &height, &GaitStyle::default())?;
@@ -140,15 +139,11 @@ impl Candidate {
         })
     }
 
-    fn sightings(&self) -> Vec<Sighting> {
-        self.seen.iter().map(|seen| seen.sighting).collect()
-    }
-
-    /// The sightings with the lowest row of the tallest one where somebody nearer may hide the feet: what ends above them
+    /// Gives the sightings whose feet somebody nearer may hide the lowest row of the tallest one: what ends above its feet
     /// would seem to stand farther away.
-    fn with_hidden_feet(&self, mut sightings: Vec<Sighting>) -> Vec<Sighting> {
+    fn uncover_feet(&self, sightings: &mut [Sighting]) {
         let Some(tallest) = sightings.iter().map(|s| s.rectangle).max_by_key(Rectangle::height) else {
-            return sightings;
+            return;
         };
         for (sighting, seen) in sightings.iter_mut().zip(&self.seen) {
             let is_short = (sighting.rectangle.height() as f64) < WHOLE_SHARE * tallest.height() as f64;
@@ -156,7 +151,6 @@ impl Candidate {
                 sighting.rectangle.bottom = tallest.bottom;
             }
         }
-        sightings
     }
 
     /// The gait with which a walk starts, or why none does.
@@ -387,7 +381,7 @@ pub(super) mod tests {
             height_m: Some(1.75),
             size: [640, 480],
         };
-        Candidate { seen, ..Candidate::default() }.begin(&given).ok()
+        Candidate { seen, missed: 0 }.begin(&given).ok()
     }
 
     /// A phone held upright sees the same as one held level, turned.

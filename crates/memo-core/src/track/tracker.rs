@@ -574,7 +574,7 @@ impl Tracker {
             let nearest = known.max_by(|a, b| a.overlap(rectangle).total_cmp(&b.overlap(rectangle)));
             match nearest {
                 Some(candidate) => candidate.add(seen),
-                None => self.candidates.push(Candidate { seen: vec![seen], ..Candidate::default() }),
+                None => self.candidates.push(Candidate { seen: vec![seen], missed: 0 }),
             }
         }
         self.candidates.retain(|candidate| candidate.missed <= MISSED_FRAMES);

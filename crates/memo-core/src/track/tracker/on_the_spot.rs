@@ -40,9 +40,8 @@ impl Tracker {
         }
         let size = [evidence.grey.width() as u32, evidence.grey.height() as u32];
         let standing = std::mem::take(&mut self.standing);
-        let next = self.identities.count();
-        let begun = self.begun_where_it_stays(standing, size, next);
-        match begun.or_else(|standing| self.begun_along_the_sight(standing, size, next)) {
+        let begun = self.begun_where_it_stays(standing, size);
+        match begun.or_else(|standing| self.begun_along_the_sight(standing, size)) {
             Ok(mut active) => {
                 self.candidates.clear();
                 match self.gone_on(&active) {
@@ -57,28 +56,18 @@ impl Tracker {
         }
     }
 
-    fn begun_where_it_stays(
-        &self,
-        standing: Standing,
-        size: [u32; 2],
-        person: usize,
-    ) -> Result<Active, Standing> {
+    fn begun_where_it_stays(&self, standing: Standing, size: [u32; 2]) -> Result<Active, Standing> {
         if self.options.treadmill == Some(false) {
             return Err(standing);
         }
-        match self.spot(&standing.sightings(), size, person) {
+        match self.spot(&standing.sightings(), size, self.identities.count()) {
             Some(spot) => spot.begin(standing),
             None => Err(standing),
         }
     }
 
     /// Only a calibrated camera shows how far away feet are.
-    fn begun_along_the_sight(
-        &self,
-        standing: Standing,
-        size: [u32; 2],
-        person: usize,
-    ) -> Result<Active, Standing> {
+    fn begun_along_the_sight(&self, standing: Standing, size: [u32; 2]) -> Result<Active, Standing> {
         let (options, sightings) = (&self.options, standing.sightings());
         let Some(camera) = options.camera.as_ref().filter(|_| options.treadmill != Some(true)) else {
             return Err(standing);
@@ -86,7 +75,8 @@ impl Tracker {
         if feet_cut_off(&sightings, size[1] as usize) || standing.lasts_s() < SHORTEST_S {
             return Err(standing);
         }
-        let height = approaching_height(options, options.height_of(person), camera, &sightings);
+        let next_m = options.height_of(self.identities.count());
+        let height = approaching_height(options, next_m, camera, &sightings);
         match options.walker(height.height_m, COMFORTABLE_MPS) {
             Ok(walker) => Approach { camera, height, walker, options }.begin(standing),
             Err(_) => Err(standing),
