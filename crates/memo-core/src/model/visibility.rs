@@ -149,6 +149,20 @@ impl PreparedView {
         options: &VisibilityOptions,
         out: &mut Vec<VisibleSegment>,
     ) {
+        let has_rims = |_| options.rims;
+        self.contours_and_rims_of(cylinders, others, camera_position, has_rims, options.rim_chords, out);
+    }
+
+    /// The same with the end ellipses of some parts.
+    pub(crate) fn contours_and_rims_of(
+        &mut self,
+        cylinders: &[EllipticCylinder],
+        others: &Others,
+        camera_position: DVec3,
+        has_rims: impl Fn(usize) -> bool,
+        rim_chords: usize,
+        out: &mut Vec<VisibleSegment>,
+    ) {
         out.clear();
         self.prepare(cylinders, camera_position);
         let shadows = self.occluders.iter().map(|o| &o.shadow).chain(&others.shadows);
@@ -159,8 +173,8 @@ impl PreparedView {
             for line in side_lines(cylinder, camera_position).iter().flatten() {
                 self.push_visible(part, line, others, out);
             }
-            if options.rims {
-                self.push_visible_rims(part, cylinder, options.rim_chords, others, out);
+            if has_rims(part) {
+                self.push_visible_rims(part, cylinder, rim_chords, others, out);
             }
         }
     }

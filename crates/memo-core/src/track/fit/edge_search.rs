@@ -7,7 +7,6 @@
 //! the strongest step counts, the less the farther it is from the line.
 
 use crate::image::Image;
-use crate::image::frame::Between;
 use crate::model::EllipticCylinder;
 use glam::DVec2;
 
@@ -47,20 +46,33 @@ pub struct FoundEdge {
 /// How far edges are searched on both sides of a line.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reach {
-    /// What an edge counts by its distance in pixels: one at the line, e^-2 at the end.
-    near: Vec<f64>,
+    /// What an edge counts by its place from one end to the other, a pixel apart: one at the line, e^-2 at the ends.
+    near: Vec<f32>,
 }
 
 impl Reach {
     /// Edges within `reach_px` pixels.
     pub fn new(reach_px: f64) -> Self {
-        let near = |offset: i64| (-0.5 * (2.0 * offset as f64 / reach_px).powi(2)).exp();
-        Self { near: (0..=reach_px.ceil() as i64).map(near).collect() }
+        let near = |offset: i32| (-0.5 * (2.0 * f64::from(offset) / reach_px).powi(2)).exp() as f32;
+        let most = reach_px.ceil() as i32;
+        Self { near: (-most..=most).map(near).collect() }
     }
 }
 
 /// A step is the difference between the means of this many samples on either side, one pixel apart.
 const SAMPLES: usize = 2;
+
+/// More than the rounding of a [`FixedPoint`].
+const ROUNDING_PX: f64 = 1e-6;
+
+/// Working memory of a search.
+#[derive(Debug, Default)]
+pub struct Profile {
+    grey: Vec<f32>,
+    /// Absolute difference from the empty scene.
+    unlike: Vec<f32>,
+    steps: Vec<f32>,
+}
 
 impl View {
     /// The strongest and nearest edge within reach of a point, along a unit normal that points outwards; `None`
@@ -71,55 +83,99 @@ impl View {
         normal: DVec2,
         reach: &Reach,
         border: Border,
-        samples: &mut Vec<[f64; 2]>,
+        profile: &mut Profile,
     ) -> Option<FoundEdge> {
-        let (near, reach) = (&reach.near, reach.near.len() as i64 - 1);
-        let margin = SAMPLES as i64;
-        let is_empty_seen = self.background.is_some();
+        let near = &reach.near[..];
+        let middle = near.len() / 2;
+        let background = self.background.as_ref().filter(|_| border == Border::Outer);
+        // 1. The samples along the normal. They are inside if the first and the last are.
         let corner = DVec2::new(self.corner[0] as f64, self.corner[1] as f64);
-        samples.clear();
-        for offset in -reach - margin..=reach + margin {
-            samples.push(self.sample(point + normal * offset as f64 - corner)?);
+        let most = (middle + SAMPLES) as f64;
+        let ends = [-most, most].map(|offset| point + normal * offset - corner);
+        let last = DVec2::new(self.grey.width() as f64, self.grey.height() as f64) - 1.0 - ROUNDING_PX;
+        let is_inside = |end: &DVec2| end.cmpge(DVec2::splat(ROUNDING_PX)).all() && end.cmple(last).all();
+        if !ends.iter().all(is_inside) {
+            return None;
         }
-        let step = |offset: i64| {
-            let at = (offset + reach + margin) as usize;
-            let fall = |of: usize| {
-                let inside: f64 = samples[at - SAMPLES..at].iter().map(|s| s[of]).sum();
-                let outside: f64 = samples[at + 1..=at + SAMPLES].iter().map(|s| s[of]).sum();
-                (inside - outside) / SAMPLES as f64
-            };
-            match border {
-                Border::Outer if is_empty_seen => (fall(1).max(0.0) * fall(0).abs()).sqrt(),
-                _ => fall(0).abs(),
-            }
-        };
-        let mut best = (0.0, 0);
-        for offset in -reach..=reach {
-            let value = step(offset) * near[offset.unsigned_abs() as usize];
-            if value > best.0 {
-                best = (value, offset);
+        let places = FixedPoint::line(ends[0], normal);
+        let (width, grey) = (self.grey.width(), self.grey.pixels());
+        let count = near.len() + 2 * SAMPLES;
+        profile.grey.resize(count, 0.0);
+        match background {
+            None => profile.grey.iter_mut().zip(places).for_each(|(at, place)| *at = place.of(grey, width)),
+            Some(behind) => {
+                let behind = &behind.pixels()[..grey.len()];
+                profile.unlike.resize(count, 0.0);
+                let profile = profile.grey.iter_mut().zip(&mut profile.unlike);
+                for ((at, unlike), place) in profile.zip(places) {
+                    *at = place.of(grey, width);
+                    *unlike = (*at - place.of(behind, width)).abs();
+                }
             }
         }
-        let offset = best.1;
-        let mut offset_px = offset as f64;
-        if -reach < offset && offset < reach {
-            // The vertex of the parabola through three steps.
-            let (before, at, after) = (step(offset - 1), step(offset), step(offset + 1));
+        // 2. The step at each of them.
+        let fall = |w: &[f32]| (w[0] + w[1] - w[3] - w[4]) / SAMPLES as f32;
+        let windows = profile.grey.windows(2 * SAMPLES + 1);
+        profile.steps.clear();
+        match background {
+            None => profile.steps.extend(windows.map(|grey| fall(grey).abs())),
+            Some(_) => {
+                let unlike = profile.unlike.windows(2 * SAMPLES + 1);
+                let both = windows.zip(unlike);
+                profile
+                    .steps
+                    .extend(both.map(|(grey, unlike)| (fall(unlike).max(0.0) * fall(grey).abs()).sqrt()));
+            }
+        }
+        // 3. The strongest, the less the farther it is.
+        let steps = &profile.steps[..];
+        let mut best = (0.0, middle);
+        for (n, (step, near)) in steps.iter().zip(near).enumerate() {
+            if step * near > best.0 {
+                best = (step * near, n);
+            }
+        }
+        // 4. The vertex of the parabola through three steps.
+        let n = best.1;
+        let mut offset_px = n as f64 - middle as f64;
+        if 0 < n && n + 1 < steps.len() {
+            let [before, at, after] = [n - 1, n, n + 1].map(|n| f64::from(steps[n]));
             let bend = before - 2.0 * at + after;
             if bend < 0.0 {
                 offset_px += (0.5 * (before - after) / bend).clamp(-0.5, 0.5);
             }
         }
-        Some(FoundEdge { offset_px, strength: if best.0 > 0.0 { step(offset) } else { 0.0 } })
+        Some(FoundEdge { offset_px, strength: if best.0 > 0.0 { f64::from(steps[n]) } else { 0.0 } })
+    }
+}
+
+/// A place between pixels, column and row in units of 2^-32 pixels: integers are faster to move and to split than
+/// floating-point numbers.
+#[derive(Clone, Copy)]
+struct FixedPoint([i64; 2]);
+
+impl FixedPoint {
+    /// The places from the first on, one step apart.
+    #[inline(always)]
+    fn line(first: DVec2, step: DVec2) -> impl Iterator<Item = Self> {
+        let fixed = |v: DVec2| [v.x, v.y].map(|x| (x * (1i64 << 32) as f64) as i64);
+        let (first, step) = (fixed(first), fixed(step));
+        (0..).map(move |n| Self([first[0] + n * step[0], first[1] + n * step[1]]))
     }
 
-    /// Grey value, and absolute difference from the background, between pixels; `None` outside the piece.
-    #[inline]
-    fn sample(&self, p: DVec2) -> Option<[f64; 2]> {
-        let width = self.grey.width();
-        let place = Between::new(p, [width, self.grey.height()], width)?;
-        let grey = place.of(self.grey.pixels());
-        Some([grey, self.background.as_ref().map_or(0.0, |behind| (grey - place.of(behind.pixels())).abs())])
+    /// The grey value there, linear along both axes, of an image whose rows have `width` pixels.
+    #[inline(always)]
+    fn of(self, pixels: &[u8], width: usize) -> f32 {
+        let [x, y] = self.0.map(|x| (x >> 32) as usize);
+        let [right, down] = self.0.map(|x| (x as u32 >> 8) as f32 / (1 << 24) as f32);
+        let pair = |at: usize| {
+            let pixels = &pixels[at..at + 2];
+            [f32::from(pixels[0]), f32::from(pixels[1])]
+        };
+        let at = y * width + x;
+        let ([a, b], [c, d]) = (pair(at), pair(at + width));
+        let (above, below) = (a + right * (b - a), c + right * (d - c));
+        above + down * (below - above)
     }
 }
 
@@ -141,7 +197,8 @@ mod tests {
     }
 
     fn found(view: &View, x: f64, border: Border) -> FoundEdge {
-        view.search(DVec2::new(100.0 + x, 70.2), DVec2::X, &Reach::new(8.0), border, &mut Vec::new()).unwrap()
+        view.search(DVec2::new(100.0 + x, 70.2), DVec2::X, &Reach::new(8.0), border, &mut Profile::default())
+            .unwrap()
     }
 
     #[test]
@@ -167,7 +224,7 @@ mod tests {
             -DVec2::X,
             &Reach::new(8.0),
             Border::Outer,
-            &mut Vec::new(),
+            &mut Profile::default(),
         );
         assert_eq!(inwards.unwrap().strength, 0.0);
     }
@@ -187,8 +244,14 @@ mod tests {
         let view = view(100);
         for x in [104.0, 156.0, 90.0, f64::NAN] {
             assert!(
-                view.search(DVec2::new(x, 70.0), DVec2::X, &Reach::new(8.0), Border::Inner, &mut Vec::new())
-                    .is_none()
+                view.search(
+                    DVec2::new(x, 70.0),
+                    DVec2::X,
+                    &Reach::new(8.0),
+                    Border::Inner,
+                    &mut Profile::default()
+                )
+                .is_none()
             );
         }
     }

@@ -8,12 +8,13 @@
 //! Limbs taper: a contour point at the height z of a cylinder, -1 to 1, is moved outwards by the share z · taper of
 //! its radius. Hidden-line removal uses the cylinders without taper.
 
+use super::edge_search::Profile;
 use super::unknowns::{
     ACROSS, ALONG, ANGLES, ANKLE, BODY, CROWN, FOOT, FOREARM, HEAD_FORWARD, HEADING, HEEL, HEIGHT, HIP_WIDTH,
     JOINTS, LEAN, LEG, PELVIS, SHANK, SHOULDER_WIDTH, TAPERS, THIGH, TILTS, TORSO, UPPER_ARM, WIDTHS,
 };
 use crate::model::body::Part;
-use crate::model::visibility::{PreparedView, VisibilityOptions, VisibleSegment};
+use crate::model::visibility::{PreparedView, VisibleSegment};
 use crate::model::{Body, Camera, ContourKind, EllipticCylinder, Others, PosedBody, side_lines};
 use glam::{DMat2, DMat3, DVec2, DVec3};
 
@@ -55,9 +56,10 @@ pub struct Sample {
 pub struct Workspace {
     view: PreparedView,
     visible: Vec<VisibleSegment>,
+    outlines: Vec<Option<Outline>>,
     pub samples: Vec<Sample>,
     pub motion: Vec<(usize, DVec3)>,
-    pub looks: Vec<[f64; 2]>,
+    pub profile: Profile,
 }
 
 /// The kind of a part: the row of its thickness in the body's table.
@@ -92,6 +94,11 @@ fn side_of(part: Part) -> usize {
     usize::from((5..8).contains(&index) || index >= 11)
 }
 
+/// Whether end ellipses of a part are compared: the top of the head, and toes and heel.
+fn has_ends(part: Part) -> bool {
+    matches!(row_of(part), 0 | 7)
+}
+
 /// Outlines of the head are compared only in the middle of its sides and of its top: real heads are round.
 const HEAD_PART: f64 = 0.4;
 const CROWN_PART: f64 = 0.5;
@@ -108,13 +115,13 @@ pub fn samples(
     spacing_px: f64,
     work: &mut Workspace,
 ) {
-    let Workspace { view, visible, samples, .. } = work;
+    let Workspace { view, visible, outlines, samples, .. } = work;
     samples.clear();
     let (cylinders, eye) = (&figure.posed.cylinders, camera.position());
-    let options = VisibilityOptions { rims: true, rim_chords: RIM_CHORDS };
-    view.visible_contours_among(cylinders, &Others::new(others, eye), eye, &options, visible);
-    let outlines: Vec<_> =
-        cylinders.iter().chain(others).map(|cylinder| outline_px(cylinder, camera, eye)).collect();
+    let has_ends = |part: usize| has_ends(Part::ALL[part]);
+    view.contours_and_rims_of(cylinders, &Others::new(others, eye), eye, has_ends, RIM_CHORDS, visible);
+    outlines.clear();
+    outlines.extend(cylinders.iter().chain(others).map(|cylinder| Outline::new(cylinder, camera, eye)));
     for segment in visible.iter() {
         let part = Part::ALL[segment.part];
         let Some(line) = Line::new(segment, part, &cylinders[segment.part], whole, camera) else { continue };
@@ -123,8 +130,8 @@ pub fn samples(
             let on_cylinder = segment.start.lerp(segment.end, (n as f64 + 0.5) / count as f64);
             let Some(mut sample) = line.sample(on_cylinder, camera) else { continue };
             let beyond = sample.point_px + 0.75 * spacing_px * sample.normal;
-            let covers = |(other, outline): (usize, &Option<[DVec2; 4]>)| {
-                other != segment.part && outline.is_some_and(|corners| contains(&corners, beyond))
+            let covers = |(other, outline): (usize, &Option<Outline>)| {
+                other != segment.part && outline.as_ref().is_some_and(|outline| outline.contains(beyond))
             };
             sample.is_outer = !outlines.iter().enumerate().any(covers);
             samples.push(sample);
@@ -152,12 +159,7 @@ impl<'a> Line<'a> {
         camera: &Camera,
     ) -> Option<Self> {
         let is_rim = matches!(segment.kind, ContourKind::TopRim | ContourKind::BottomRim);
-        let has_ends = match row_of(part) {
-            0 => segment.kind == ContourKind::TopRim,
-            7 => true,
-            _ => false,
-        };
-        if is_rim && !has_ends {
+        if part == Part::Head && segment.kind == ContourKind::BottomRim {
             return None;
         }
         let taper = taper_of(part).map_or(0.0, |taper| whole[TAPERS + taper]);
@@ -206,18 +208,33 @@ impl<'a> Line<'a> {
 }
 
 /// The quadrangle between the side lines of a part, pixels.
-fn outline_px(cylinder: &EllipticCylinder, camera: &Camera, eye: DVec3) -> Option<[DVec2; 4]> {
-    let [left, right] = side_lines(cylinder, eye)?;
-    let corners = [left.start, left.end, right.end, right.start];
-    let [a, b, c, d] = corners.map(|corner| camera.project(corner));
-    Some([a?, b?, c?, d?])
+#[derive(Debug, Clone)]
+struct Outline {
+    corners: [DVec2; 4],
+    low: DVec2,
+    high: DVec2,
 }
 
-/// Whether a convex quadrangle contains a point.
-fn contains(corners: &[DVec2; 4], point: DVec2) -> bool {
-    let turns = (0..4).map(|n| (corners[(n + 1) % 4] - corners[n]).perp_dot(point - corners[n]) > 0.0);
-    let left = turns.filter(|&is_left| is_left).count();
-    left == 0 || left == 4
+impl Outline {
+    fn new(cylinder: &EllipticCylinder, camera: &Camera, eye: DVec3) -> Option<Self> {
+        let [left, right] = side_lines(cylinder, eye)?;
+        let [a, b, c, d] =
+            [left.start, left.end, right.end, right.start].map(|corner| camera.project(corner));
+        let corners = [a?, b?, c?, d?];
+        let [low, high] = [DVec2::min, DVec2::max].map(|most| corners.into_iter().reduce(most));
+        Some(Self { corners, low: low?, high: high? })
+    }
+
+    /// Whether a point is inside; the quadrangle is convex.
+    fn contains(&self, point: DVec2) -> bool {
+        if point.cmplt(self.low).any() || point.cmpgt(self.high).any() {
+            return false;
+        }
+        let corners = &self.corners;
+        let turns = (0..4).map(|n| (corners[(n + 1) % 4] - corners[n]).perp_dot(point - corners[n]) > 0.0);
+        let left = turns.filter(|&is_left| is_left).count();
+        left == 0 || left == 4
+    }
 }
 
 impl Figure {

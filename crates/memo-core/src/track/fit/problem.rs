@@ -104,14 +104,18 @@ const STEPS: [usize; 3] = [4, 4, 4];
 /// the first and at the last step.
 const REACH: [f64; 2] = [0.06, 0.02];
 const SCALE: [f64; 2] = [0.03, 0.008];
+const FRAMES_AT_ONCE: usize = 64;
 /// Sample points per body height. Their edges err together, so each counts with a standard deviation of their
 /// distance from each other.
 const SAMPLES_PER_HEIGHT: f64 = 75.0;
 const LEAST_SPACING_PX: f64 = 2.0;
+/// In the steps from a starting gait, whose searches are the longest, samples are so many times as far apart, and each
+/// counts as so many.
+const FIRST_SPACING: f64 = 2.0;
 const LEAST_REACH_PX: f64 = 4.0;
 
-/// From which gait a fit starts is decided by this many frames, and at least one in so many seconds: steps take half a
-/// second.
+/// From which gait a fit starts is decided by this many frames at most, unless they are farther apart than this time, in
+/// seconds: steps take half a second.
 const FEW_FRAMES: usize = 24;
 const FEW_S: f64 = 0.125;
 
@@ -179,12 +183,11 @@ impl<'a> Problem<'a> {
         if self.frames.len() < LEAST_FRAMES {
             return Err(FitError::TooFewFrames { got: self.frames.len() });
         }
-        let (as_tracked, gait) = self.best_start(0.0).ok_or(FitError::Undetermined)?;
-        let as_tracked = self.finished(as_tracked).ok_or(FitError::Undetermined)?;
-        let exchanged = p_tracked_swapped.and_then(|_| {
-            let start = self.started(0.5, gait.mirrored())?.1;
-            self.finished(start)
-        });
+        let (start, gait) = self.best_start(0.0).ok_or(FitError::Undetermined)?;
+        let exchanged = || self.finished(self.started(0.5, gait.mirrored())?.1);
+        let (as_tracked, exchanged) =
+            rayon::join(|| self.finished(start), || p_tracked_swapped.and_then(|_| exchanged()));
+        let as_tracked = as_tracked.ok_or(FitError::Undetermined)?;
         let p_tracked = p_tracked_swapped.unwrap_or(0.0);
         let p_exchanged =
             exchanged.as_ref().map_or(0.0, |other| self.p_other_sides(&as_tracked, other, p_tracked));
@@ -217,19 +220,20 @@ impl<'a> Problem<'a> {
     /// phase shifted by some cycles.
     pub(super) fn best_start(&self, phase: f64) -> Option<(Unknowns, StartGait)> {
         let few = self.of_few_frames();
-        let costs = StartGait::ALL
-            .into_iter()
-            .filter_map(|gait| Some((few.started(phase, gait)?.0 * gait.handicap(), gait)));
-        let (_, gait) = costs.min_by(|a, b| a.0.total_cmp(&b.0))?;
+        let costs: Vec<_> = StartGait::ALL
+            .into_par_iter()
+            .filter_map(|gait| Some((few.started(phase, gait)?.0 * gait.handicap(), gait)))
+            .collect();
+        let (_, gait) = costs.into_iter().min_by(|a, b| a.0.total_cmp(&b.0))?;
         Some((self.started(phase, gait)?.1, gait))
     }
 
-    /// The same with every second, third ... frame, but no fewer than [`FEW_FRAMES`] in all and one in [`FEW_S`].
+    /// The same with every second, third ... frame, so that there are about [`FEW_FRAMES`], but at least one in [`FEW_S`].
     fn of_few_frames(&self) -> Self {
         let count = self.frames.len();
         let ends = self.frames.first().zip(self.frames.last());
         let every_s = ends.map_or(0.0, |(first, last)| last.time_s - first.time_s) / count.max(2) as f64;
-        let every = (count / FEW_FRAMES).min((FEW_S / every_s) as usize).max(1);
+        let every = count.div_ceil(FEW_FRAMES).min((FEW_S / every_s) as usize).max(1);
         let frames = self.frames.iter().copied().step_by(every).collect();
         Self { frames, priors: self.priors.clone(), ..*self }
     }
@@ -319,14 +323,17 @@ impl<'a> Problem<'a> {
         // While only curves are fitted, frames have no angles of their own.
         let block = if free { FRAME } else { FRAME_ANGLES };
         let mut arrow = Arrow::new(self.frames.len(), block, WHOLE);
-        let terms: Vec<_> = (0..self.frames.len())
-            .into_par_iter()
-            .map_init(Room::default, |room, frame| self.frame_terms(unknowns, frame, block, width, room))
-            .collect();
         let mut seen = Seen::default();
-        for (frame, (normal, right, of_frame)) in terms.iter().enumerate() {
-            arrow.add_frame(frame, normal, right);
-            seen.add(of_frame);
+        let frames: Vec<usize> = (0..self.frames.len()).collect();
+        // The terms of all frames of a long walk would need much memory at once.
+        for frames in frames.chunks(FRAMES_AT_ONCE) {
+            let terms = frames.par_iter().map_init(Room::default, |room, &frame| {
+                (frame, self.frame_terms(unknowns, frame, block, width, room))
+            });
+            for (frame, (normal, right, of_frame)) in terms.collect::<Vec<_>>() {
+                arrow.add_frame(frame, &normal, &right);
+                seen.add(&of_frame);
+            }
         }
         self.add_priors(unknowns, block, &mut arrow);
         let solution = arrow.solve()?;
@@ -366,13 +373,13 @@ impl<'a> Problem<'a> {
         let work = &mut room.work;
         let view = &self.frames[frame].view;
         samples(&figure, &view.others, self.camera, &unknowns.whole, width.spacing_px(), work);
-        let mut normal = DMatrix::<f64>::zeros(FIGURE, FIGURE);
-        let mut right = DVector::<f64>::zeros(FIGURE);
+        let mut terms = FigureTerms::new();
         let mut seen = Seen::default();
-        let Workspace { samples, motion, looks, .. } = work;
+        let Workspace { samples, motion, profile, .. } = work;
         for sample in samples.iter() {
             let border = if sample.is_outer { Border::Outer } else { Border::Inner };
-            let Some(edge) = view.search(sample.point_px, sample.normal, &width.reach, border, looks) else {
+            let Some(edge) = view.search(sample.point_px, sample.normal, &width.reach, border, profile)
+            else {
                 continue;
             };
             let importance = importance(sample);
@@ -382,16 +389,10 @@ impl<'a> Problem<'a> {
                 continue;
             }
             let clear = edge.strength / (edge.strength + CLEAR_STEP);
-            let weight = importance * near * clear / width.sd_px().powi(2);
+            let weight = width.spacing * importance * near * clear / width.sd_px().powi(2);
             figure.motion(sample, motion);
             let n_j = gradient(self.camera, sample.world, sample.normal);
-            add_terms(
-                &mut normal,
-                &mut right,
-                motion.iter().map(|(q, dx)| (*q, n_j.dot(*dx))),
-                edge.offset_px,
-                weight,
-            );
+            terms.add(motion.iter().map(|(q, dx)| (*q, n_j.dot(*dx))), edge.offset_px, weight);
         }
         // The head ends where the changes do, but for what hair and the windows of the change detection make of it.
         if let Some((crown, off_px)) = view.crown_px.and_then(|crown_px| self.crown(&figure, crown_px)) {
@@ -400,13 +401,13 @@ impl<'a> Problem<'a> {
             let weight = if beyond_px == 0.0 { 0.0 } else { (CROWN_SD * width.height_px).powi(-2) };
             figure.motion(&crown, motion);
             let n_j = gradient(self.camera, crown.world, crown.normal);
-            let slopes = motion.iter().map(|(q, dx)| (*q, n_j.dot(*dx)));
-            add_terms(&mut normal, &mut right, slopes, beyond_px, weight);
+            terms.add(motion.iter().map(|(q, dx)| (*q, n_j.dot(*dx))), beyond_px, weight);
         }
         // The lower foot stands on the ground, with an error common to about ten independent frames.
         let (side, lowest) = figure.lowest_point();
         let weight = self.ground_sd_m.powi(-2) / (self.frames.len() as f64 / GROUND_FRAMES).max(1.0);
-        add_terms(&mut normal, &mut right, figure.height_slopes(side, lowest).into_iter(), -lowest.z, weight);
+        terms.add(figure.height_slopes(side, lowest).into_iter(), -lowest.z, weight);
+        let (normal, right) = terms.sums();
         (figure, normal, right, seen)
     }
 
@@ -468,6 +469,8 @@ pub(super) struct Width {
     reach: Reach,
     scale_px: f64,
     height_px: f64,
+    /// Factor on the distance between samples, and on what one counts.
+    spacing: f64,
 }
 
 impl Width {
@@ -475,11 +478,12 @@ impl Width {
         let done = n as f64 / (STEPS.iter().sum::<usize>() - 1) as f64;
         let at = |[first, last]: [f64; 2]| height_px * (first + (last - first) * done);
         let reach = Reach::new(at(REACH).max(LEAST_REACH_PX));
-        Self { reach, scale_px: at(SCALE).max(1.0), height_px }
+        let spacing = if n < STEPS[0] { FIRST_SPACING } else { 1.0 };
+        Self { reach, scale_px: at(SCALE).max(1.0), height_px, spacing }
     }
 
     fn spacing_px(&self) -> f64 {
-        (self.height_px / SAMPLES_PER_HEIGHT).max(LEAST_SPACING_PX)
+        self.spacing * (self.height_px / SAMPLES_PER_HEIGHT).max(LEAST_SPACING_PX)
     }
 
     /// Standard deviation of the edge of one sample.
@@ -550,19 +554,69 @@ const RATES: [f64; FRAME] = {
     rates
 };
 
-/// Adds weight (Σ slope q - offset)² to normal equations over the figure.
-fn add_terms(
-    normal: &mut DMatrix<f64>,
-    right: &mut DVector<f64>,
-    slopes: impl Iterator<Item = (usize, f64)> + Clone,
-    offset: f64,
-    weight: f64,
-) {
-    for (i, a) in slopes.clone() {
-        for (j, b) in slopes.clone() {
-            normal[(i, j)] += weight * a * b;
+/// Normal equations over the coordinates of the figure.
+struct FigureTerms {
+    normal: DMatrix<f64>,
+    right: DVector<f64>,
+    /// The latest terms, which depend on the same few coordinates: those of the samples of one part.
+    part: PartTerms,
+}
+
+#[derive(Debug, Default)]
+struct PartTerms {
+    coordinates: Vec<usize>,
+    slopes: Vec<f64>,
+    normal: Vec<f64>,
+    right: Vec<f64>,
+}
+
+impl FigureTerms {
+    fn new() -> Self {
+        Self {
+            normal: DMatrix::zeros(FIGURE, FIGURE),
+            right: DVector::zeros(FIGURE),
+            part: PartTerms::default(),
         }
-        right[i] += weight * a * offset;
+    }
+
+    /// Adds weight (Σ slope q - offset)².
+    fn add(&mut self, slopes: impl ExactSizeIterator<Item = (usize, f64)> + Clone, offset: f64, weight: f64) {
+        let coordinates = slopes.clone().map(|(q, _)| q);
+        if !coordinates.clone().eq(self.part.coordinates.iter().copied()) {
+            self.add_part();
+            let count = slopes.len();
+            self.part.coordinates.clear();
+            self.part.coordinates.extend(coordinates);
+            for sums in [&mut self.part.normal, &mut self.part.right] {
+                sums.clear();
+            }
+            self.part.normal.resize(count * count, 0.0);
+            self.part.right.resize(count, 0.0);
+        }
+        let PartTerms { slopes: values, normal, right, .. } = &mut self.part;
+        values.clear();
+        values.extend(slopes.map(|(_, slope)| slope));
+        for ((row, right), a) in normal.chunks_exact_mut(values.len()).zip(right).zip(values.iter()) {
+            add_scaled(row, values, weight * a);
+            *right += weight * a * offset;
+        }
+    }
+
+    fn add_part(&mut self) {
+        let PartTerms { coordinates, normal, right, .. } = &self.part;
+        for ((&i, row), of_right) in
+            coordinates.iter().zip(normal.chunks_exact(coordinates.len().max(1))).zip(right)
+        {
+            for (&j, sum) in coordinates.iter().zip(row) {
+                self.normal[(i, j)] += sum;
+            }
+            self.right[i] += of_right;
+        }
+    }
+
+    fn sums(mut self) -> (DMatrix<f64>, DVector<f64>) {
+        self.add_part();
+        (self.normal, self.right)
     }
 }
 
