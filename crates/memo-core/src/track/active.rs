@@ -700,7 +700,15 @@ pub(super) mod tests {
                     time_s,
                     rectangle: rectangle_of(&walker, &camera, &seen.at(along_m), along_m),
                 }),
-                FrameEdges { frame: k, time_s, window: WINDOW, edges, others: Vec::new(), shared: false },
+                FrameEdges {
+                    frame: k,
+                    time_s,
+                    window: WINDOW,
+                    edges,
+                    others: Vec::new(),
+                    shared: false,
+                    newcomer: false,
+                },
             )
         };
         (0..count).map(frame).collect()

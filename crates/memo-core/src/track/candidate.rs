@@ -46,6 +46,8 @@ pub(super) struct Candidate {
     pub seen: Vec<Seen>,
     /// Frames without it since the last one.
     pub missed: usize,
+    /// Whether a start was refused.
+    pub refused: bool,
 }
 
 /// What a walk starts from.
@@ -84,6 +86,12 @@ impl Candidate {
         self.last_rectangle().is_some_and(|last| last.gap(window) == [0, 0])
     }
 
+    /// True if it was in the last frame and no start was refused: what was refused may be a part of somebody who is
+    /// followed.
+    pub fn may_start(&self) -> bool {
+        self.missed == 0 && !self.refused
+    }
+
     pub fn add(&mut self, seen: Seen) {
         self.seen.push(seen);
         self.missed = 0;
@@ -91,6 +99,7 @@ impl Candidate {
 
     /// Drops the oldest frames after a refused start.
     pub fn refuse(&mut self, options: &TrackerOptions) {
+        self.refused = true;
         self.seen.drain(..(options.start_frames / 3).min(self.seen.len()));
     }
 
@@ -354,8 +363,15 @@ pub(super) mod tests {
                 bottom: (sole.y).round() as usize,
             };
             let edges = edges_of(&scene, &hypothesis);
-            let edges =
-                FrameEdges { frame: k, time_s, window: rectangle, edges, others: Vec::new(), shared: false };
+            let edges = FrameEdges {
+                frame: k,
+                time_s,
+                window: rectangle,
+                edges,
+                others: Vec::new(),
+                shared: false,
+                newcomer: false,
+            };
             Seen { sighting: Sighting { time_s, rectangle }, edges, piece: None }
         };
         (0..5).map(frame).collect()
@@ -381,7 +397,7 @@ pub(super) mod tests {
             height_m: Some(1.75),
             size: [640, 480],
         };
-        Candidate { seen, missed: 0 }.begin(&given).ok()
+        Candidate { seen, ..Candidate::default() }.begin(&given).ok()
     }
 
     /// A phone held upright sees the same as one held level, turned.
@@ -461,6 +477,15 @@ pub(super) mod tests {
         for (speed_mps, walks) in [(0.2, false), (0.3, true), (2.9, true), (3.2, false)] {
             assert_eq!(begun(seen_walking(speed_mps)).is_some(), walks, "{speed_mps} m/s");
         }
+    }
+
+    #[test]
+    fn a_candidate_may_start_until_a_start_is_refused() {
+        let mut candidate = Candidate { seen: seen_walking(1.3), ..Candidate::default() };
+        assert!(candidate.may_start());
+        assert!(!Candidate { missed: 1, seen: seen_walking(1.3), ..Candidate::default() }.may_start());
+        candidate.refuse(&TrackerOptions::default());
+        assert!(!candidate.may_start());
     }
 
     #[test]

@@ -420,6 +420,7 @@ impl Tracker {
                 &meeting.iter().map(|&other| &expected[other]).collect::<Vec<_>>(),
             );
             edges.shared = !meeting.is_empty();
+            edges.newcomer = self.candidates.iter().any(|it| it.may_start() && it.is_in(&own.window));
             edges.others.clone_from(&others);
             // 3. A rectangle that nobody else is in.
             let overlaps = |region: &&Rectangle| region.gap(&own.window) == [0, 0];
@@ -574,7 +575,7 @@ impl Tracker {
             let nearest = known.max_by(|a, b| a.overlap(rectangle).total_cmp(&b.overlap(rectangle)));
             match nearest {
                 Some(candidate) => candidate.add(seen),
-                None => self.candidates.push(Candidate { seen: vec![seen], missed: 0 }),
+                None => self.candidates.push(Candidate { seen: vec![seen], ..Candidate::default() }),
             }
         }
         self.candidates.retain(|candidate| candidate.missed <= MISSED_FRAMES);
@@ -644,7 +645,7 @@ impl Tracker {
     ) -> Result<FrameEdges, TrackError> {
         let edges = evidence.edges(window, camera, &self.options.evidence)?.lines;
         let (frame, time_s, window) = (evidence.frame, evidence.time_s, *window);
-        Ok(FrameEdges { frame, time_s, window, edges, others: Vec::new(), shared: false })
+        Ok(FrameEdges { frame, time_s, window, edges, others: Vec::new(), shared: false, newcomer: false })
     }
 
     /// The given camera, or the one assumed for somebody who is followed.

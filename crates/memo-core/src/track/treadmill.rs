@@ -220,7 +220,15 @@ mod tests {
             let edges = edges_of(&scene, &Hypothesis { along_m, height_m, phase: 0.3 + rate_hz * time_s });
             (
                 Some(Sighting { time_s, rectangle: rectangle_of(&walker, &camera, &path, along_m) }),
-                FrameEdges { frame: k, time_s, window, edges, others: Vec::new(), shared: false },
+                FrameEdges {
+                    frame: k,
+                    time_s,
+                    window,
+                    edges,
+                    others: Vec::new(),
+                    shared: false,
+                    newcomer: false,
+                },
             )
         };
         Standing { kept: (0..12).map(frame).collect(), ..Standing::default() }
@@ -294,6 +302,7 @@ mod tests {
             edges: Vec::new(),
             others: Vec::new(),
             shared: false,
+            newcomer: false,
         }
     }
 

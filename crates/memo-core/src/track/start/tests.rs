@@ -223,6 +223,7 @@ fn planted(forward: bool, rate_hz: f64) -> (Vec<FrameEdges>, Course, Camera) {
             edges,
             others: Vec::new(),
             shared: false,
+            newcomer: false,
         }
     };
     let frames = (0..5).map(frame).collect();

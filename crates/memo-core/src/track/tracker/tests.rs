@@ -598,7 +598,7 @@ fn heights_are_those_of_people_in_order_of_appearance() {
 /// Two given heights, and the frames of somebody who walks.
 fn sought_with_heights() -> Tracker {
     let options = TrackerOptions { start_frames: 5, further_heights_m: vec![1.6], ..options() };
-    let candidate = Candidate { seen: seen_walking(1.3), missed: 0 };
+    let candidate = Candidate { seen: seen_walking(1.3), ..Candidate::default() };
     Tracker { candidates: vec![candidate], ..Tracker::new(options).unwrap() }
 }
 
@@ -634,7 +634,7 @@ fn of_two_who_start_at_once_the_candidate_of_longer_standing_is_first() {
             edge.end[0] += 150.0;
         });
     }
-    tracker.candidates.push(Candidate { seen: later, missed: 0 });
+    tracker.candidates.push(Candidate { seen: later, ..Candidate::default() });
     tracker.start(&evidence(5, &[]));
     let places: Vec<f64> = tracker.people.iter().map(|active| active.sign_at(0).unwrap().place_m.x).collect();
     assert!(places.len() == 2 && places[0] + 1.0 < places[1], "{places:?}");
