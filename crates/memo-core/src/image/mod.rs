@@ -31,6 +31,7 @@ pub use gain::{Gain, estimate_gain};
 pub use light::{LightReport, SteadyLight};
 pub use line::{EdgeSegment, LineError, LineOptions, edge_segments, segments_from_chains};
 pub use outline::{Outline, outlines};
+pub(crate) use region::group_regions_of;
 pub use region::{GroupOptions, Rectangle, Region, Sides, group_regions, regions};
 pub use runs::Run;
 pub use shrink::shrunk;

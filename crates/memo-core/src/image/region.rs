@@ -216,13 +216,24 @@ impl GroupOptions {
 /// The largest region takes in the areas that are near enough, largest first, until none is left; then the
 /// largest remaining region does the same, and so on.
 pub fn group_regions(regions: &[Region], options: &GroupOptions) -> Vec<Region> {
+    group_regions_of(regions, options, |_| true)
+}
+
+/// The same, but no group takes in an area with which its rectangle cannot be that of one object.
+pub(crate) fn group_regions_of(
+    regions: &[Region],
+    options: &GroupOptions,
+    can_be_one: impl Fn(&Rectangle) -> bool,
+) -> Vec<Region> {
     let mut parts: Vec<&Region> = regions.iter().filter(|part| part.area >= options.min_part_area).collect();
     parts.sort_by_key(|part| (Reverse(part.area), part.runs[0]));
     let mut groups = Vec::new();
     while !parts.is_empty() {
         let mut members = vec![parts.remove(0)];
         let mut whole = members[0].rectangle;
-        while let Some(i) = parts.iter().position(|part| belongs(&whole, &part.rectangle, options)) {
+        while let Some(i) = parts.iter().position(|part| {
+            belongs(&whole, &part.rectangle, options) && can_be_one(&whole.union(&part.rectangle))
+        }) {
             whole = whole.union(&parts[i].rectangle);
             members.push(parts.remove(i));
         }
@@ -399,6 +410,15 @@ pub(super) mod tests {
         assert_eq!(groups[0], neighbour);
         assert_eq!(groups[1].rectangle, trunk.rectangle.union(&shoe.rectangle));
         assert_eq!(groups[1].area, trunk.area + shoe.area);
+    }
+
+    #[test]
+    fn areas_that_cannot_be_one_object_stay_apart() {
+        let (near, far) = (block(100, 100, 30, 80), block(105, 30, 28, 65));
+        let parts = [near.clone(), far.clone()];
+        assert_eq!(group_regions(&parts, &GroupOptions::default()).len(), 1);
+        let is_low = |whole: &Rectangle| whole.height() <= 100;
+        assert_eq!(group_regions_of(&parts, &GroupOptions::default(), is_low), [near, far]);
     }
 
     #[test]

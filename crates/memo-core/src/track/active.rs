@@ -291,6 +291,14 @@ impl Active {
         if turns.iter().any(|turn| *turn != DVec3::ZERO) { turns } else { Vec::new() }
     }
 
+    /// True if path and person can be settled: so many frames were followed, or fewer of somebody who moves on, but for as
+    /// long. Who stays needs all of them for a start on the spot.
+    pub(super) fn shows_path(&self, options: &TrackerOptions) -> bool {
+        let ends = self.kept.first().zip(self.kept.last());
+        let lasts_s = ends.map_or(0.0, |((_, first), (_, last))| last.time_s - first.time_s);
+        self.kept.len() >= options.path_frames || lasts_s >= options.path_s() && self.moves_on()
+    }
+
     /// Starts again with smaller steps if the phase stands still, on an oblique path if the kept frames show one, and with
     /// the person's own body and gait. This happens once per walk.
     pub(super) fn settle(&mut self, backdrop: &Backdrop, options: &TrackerOptions) {
@@ -507,6 +515,24 @@ pub(super) mod tests {
             step(k, at, if is_last { similarity } else { 0.5 })
         };
         active((0..count).map(next).collect())
+    }
+
+    #[test]
+    fn fewer_frames_that_last_as_long_show_a_path_of_who_moves_on() {
+        let options = TrackerOptions::default();
+        let followed = |count: usize, frame_s: f64, speed_mps: f64| {
+            let steps = (0..count).map(|k| step(k, [speed_mps * FRAME_S * k as f64, 0.05 * k as f64], 0.5));
+            let mut active = active(steps.collect());
+            active.kept = (0..count).map(|k| (None, frame_at(k, frame_s * k as f64))).collect();
+            active.shows_path(&options)
+        };
+        assert!(!followed(39, 0.04, 1.2) && followed(40, 0.04, 1.2), "25 frames per second");
+        assert!(!followed(11, 0.143, 1.2) && followed(12, 0.143, 1.2), "7 frames per second");
+        assert!(!followed(39, 0.143, 0.1) && followed(40, 0.143, 0.1), "who stays");
+    }
+
+    fn frame_at(frame: usize, time_s: f64) -> FrameEdges {
+        FrameEdges { frame, time_s, window: WINDOW, edges: Vec::new(), others: Vec::new(), shared: false }
     }
 
     #[test]

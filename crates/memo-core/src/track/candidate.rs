@@ -2,12 +2,14 @@
 
 use super::active::Active;
 use super::decisions::{
-    FASTEST_MPS, GLANCE_CONTRAST, GLANCE_SHARE, OTHER_GAIT_GAIN, SLOWEST_MPS, WALKER_CONTRAST,
+    FASTEST_MPS, GLANCE_CONTRAST, GLANCE_SHARE, OTHER_GAIT_GAIN, SLANT_GAIN, SLOWEST_MPS, WALKER_CONTRAST,
 };
 use super::fit::views::Piece;
 use super::height::{BodyHeight, GIVEN_SD_M};
 use super::left_out::Reason;
-use super::locate::{Course, Crown, LocateError, Sighting, camera_from_sightings, locate, same_person};
+use super::locate::{
+    Course, Crown, LocateError, Sighting, camera_from_sightings, locate, locate_slanting, same_person,
+};
 use super::options::TrackerOptions;
 use super::options::start_height;
 use super::standing::Standing;
@@ -118,10 +120,11 @@ impl Candidate {
         self.uncover_feet(&mut sightings);
         let height = start_height(options, given.height_m, given.camera, &sightings).on_scale(given.scale_sd);
         if options.treadmill == Some(true) {
-            let Entered { course, .. } = Entered::new(&sightings, given, &height, &GaitStyle::default())?;
+            let Entered { course, .. } =
+                Entered::new(&sightings, given, &height, &GaitStyle::default(), Way::Across)?;
             return Err(Reason::OverGround { speed_mps: course.speed_mps });
         }
-        let Started { camera, course, walker, start } = self.started(&sightings, given, &height)?;
+        let Started { camera, course, walker, start } = self.started_any_way(&sightings, given, &height)?;
         let mut walk = Walk::new(walker.clone(), start.path, start.beginning);
         for seen in &self.seen {
             walk.follow(&seen.edges, &camera, &options.walk);
@@ -162,6 +165,29 @@ impl Candidate {
         }
     }
 
+    /// The start along the image plane or, of sightings that last as long as a path needs to be settled, along an oblique
+    /// path, if the contours fit it better.
+    fn started_any_way(
+        &self,
+        sightings: &[Sighting],
+        given: &Given<'_>,
+        height: &BodyHeight,
+    ) -> Result<Started, Reason> {
+        let across = self.started(sightings, given, height, Way::Across);
+        let is_long = lasts_s(sightings) >= given.options.path_s();
+        let oblique = is_long.then(|| self.started(sightings, given, height, Way::Oblique).ok()).flatten();
+        let similarity = |started: &Started| started.start.lines.best.similarity;
+        match (across, oblique) {
+            (across, None) => across,
+            (Ok(across), Some(oblique))
+                if similarity(&oblique) <= (1.0 + SLANT_GAIN) * similarity(&across) =>
+            {
+                Ok(across)
+            }
+            (_, Some(oblique)) => Ok(oblique),
+        }
+    }
+
     /// The gait with which a walk starts, or why none does.
     ///
     /// 1. A glance at every third frame, with every gait.
@@ -172,9 +198,10 @@ impl Candidate {
         sightings: &[Sighting],
         given: &Given<'_>,
         height: &BodyHeight,
+        way: Way,
     ) -> Result<Started, Reason> {
         let options = given.options;
-        let entered = |style: &GaitStyle| Entered::new(sightings, given, height, style);
+        let entered = |style: &GaitStyle| Entered::new(sightings, given, height, style, way);
         let average = entered(&GaitStyle::default())?;
         let gaits = if options.fit.is_some() { &OTHER_GAITS[..] } else { &[] };
         let others: Vec<Entered> = gaits.iter().filter_map(|style| entered(style).ok()).collect();
@@ -208,6 +235,20 @@ impl Candidate {
     }
 }
 
+/// Which path is looked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Way {
+    /// Parallel to the image plane.
+    Across,
+    /// The one that comes nearer or goes away.
+    Oblique,
+}
+
+/// Time from the first sighting to the last, seconds.
+fn lasts_s(sightings: &[Sighting]) -> f64 {
+    sightings.first().zip(sightings.last()).map_or(0.0, |(first, last)| last.time_s - first.time_s)
+}
+
 /// The course of a candidate as somebody of one gait.
 struct Entered {
     camera: Camera,
@@ -222,13 +263,19 @@ impl Entered {
         given: &Given<'_>,
         height: &BodyHeight,
         style: &GaitStyle,
+        way: Way,
     ) -> Result<Self, Reason> {
         let styled = |speed_mps: f64| {
             let walker = given.options.walker(height.height_m, speed_mps).map_err(|_| Reason::WrongSize)?;
             Ok::<_, Reason>(Walker { style: *style, ..walker })
         };
         let crown_m = styled(COMFORTABLE_MPS)?.level_crown_height_m();
-        let (camera, course) = course(sightings, given, crown_m, height)?;
+        let (camera, mut course) = course(sightings, given, crown_m, height)?;
+        if way == Way::Oblique {
+            let crown = Crown { height_m: crown_m, sd_m: height.sd_in_camera_m() };
+            let oblique = locate_slanting(sightings, &camera, &crown).ok_or(Reason::NotWalking)?;
+            course = Course { depth_sd_m: course.depth_sd_m, ..oblique };
+        }
         let speed_mps = course.speed_mps;
         if speed_mps < SLOWEST_MPS {
             return Err(Reason::TooSlow { speed_mps });
@@ -347,15 +394,19 @@ pub(super) mod tests {
     }
 
     fn seen_of(walker: &Walker, speed_mps: f64) -> Vec<Seen> {
+        seen_along(&PATH, walker, speed_mps, 5, 0.1)
+    }
+
+    fn seen_along(path: &Path, walker: &Walker, speed_mps: f64, count: usize, frame_s: f64) -> Vec<Seen> {
         let camera = camera();
-        let scene = Scene::new(walker, &camera, &PATH);
+        let scene = Scene::new(walker, &camera, path);
         let crown_m = walker.level_crown_height_m();
         let frame = |k: usize| {
-            let time_s = 0.1 * k as f64;
+            let time_s = frame_s * k as f64;
             let along_m = -0.4 + speed_mps * time_s;
             let height_m = walker.level_torso_height_m();
             let hypothesis = Hypothesis { along_m, height_m, phase: 0.2 + 0.9 * time_s };
-            let [sole, crown] = [0.0, crown_m].map(|z| camera.project(PATH.point(along_m, z)).unwrap());
+            let [sole, crown] = [0.0, crown_m].map(|z| camera.project(path.point(along_m, z)).unwrap());
             let rectangle = Rectangle {
                 left: (sole.x - 40.0).round() as usize,
                 right: (sole.x + 40.0).round() as usize,
@@ -374,7 +425,7 @@ pub(super) mod tests {
             };
             Seen { sighting: Sighting { time_s, rectangle }, edges, piece: None }
         };
-        (0..5).map(frame).collect()
+        (0..count).map(frame).collect()
     }
 
     fn begun(seen: Vec<Seen>) -> Option<Active> {
@@ -453,6 +504,16 @@ pub(super) mod tests {
         let hidden_m = depth_m(true).expect("a walker");
         assert!((hidden_m - whole_m).abs() < 0.05, "{hidden_m} {whole_m}");
         assert!(depth_m(false).is_none_or(|cut_m| cut_m > whole_m + 0.3), "nobody hid them");
+    }
+
+    #[test]
+    fn frames_that_last_long_enough_start_an_oblique_path() {
+        let oblique = Path { heading_rad: 0.8, ..PATH };
+        for (frame_s, heading_rad, tolerance_rad) in [(0.04, 0.0, 1e-9), (0.14, 0.8, 0.15)] {
+            let started = begun(seen_along(&oblique, &walker(), 1.2, 13, frame_s)).expect("a walker");
+            let off_rad = (started.start.path.heading_rad - heading_rad).abs();
+            assert!(off_rad <= tolerance_rad, "{frame_s} {}", started.start.path.heading_rad);
+        }
     }
 
     #[test]

@@ -16,7 +16,7 @@ use crate::image::line::{EdgeSegment, LineError, LineOptions, segments_from_chai
 use crate::image::{
     Background, BackgroundOptions, ChangeDetector, ChangeOptions, CleanOptions, Frame, FrameError,
     GroupOptions, Image, LightReport, Mask, Rectangle, Region, SteadyLight, clean, dilate, fill_holes,
-    group_regions, regions,
+    group_regions, group_regions_of, regions,
 };
 use crate::model::Camera;
 use glam::DVec2;
@@ -151,7 +151,17 @@ impl Evidence {
 
     /// Candidate regions, largest first.
     pub fn candidates(&self, options: &EvidenceOptions) -> Vec<Region> {
-        group_regions(&regions(&self.firm_mask, options.group.min_part_area), &options.group)
+        self.candidates_of(options, |_| true)
+    }
+
+    /// The same; no areas are joined whose rectangle cannot be that of one person.
+    pub(crate) fn candidates_of(
+        &self,
+        options: &EvidenceOptions,
+        can_be_one: impl Fn(&Rectangle) -> bool,
+    ) -> Vec<Region> {
+        let parts = regions(&self.firm_mask, options.group.min_part_area);
+        group_regions_of(&parts, &options.group, can_be_one)
     }
 
     /// The rectangle of all changes at one of the firm ones. It reaches down to feet that hardly move.

@@ -9,6 +9,7 @@
 //! [`WalkFit::height`]: super::fit::WalkFit::height
 
 use super::locate::{Sighting, person_midpoints};
+use crate::image::Rectangle;
 use crate::model::position::{PositionOptions, height_on_ground};
 use crate::model::{Camera, Walker};
 
@@ -27,6 +28,9 @@ const RECTANGLE_SD_M: f64 = 0.05;
 const MOST_POPULATION_SD: f64 = 3.5;
 /// A given height that is farther from a measured one contradicts it, standard deviations.
 const CONTRADICTION_SD: f64 = 3.0;
+
+/// Rectangles of people are not taller, metres.
+const TALLEST_M: f64 = 2.4;
 
 /// Where a height comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -127,12 +131,21 @@ impl BodyHeight {
     }
 }
 
+/// False if a rectangle that stands on the ground is taller than a person.
+pub(super) fn is_of_one_person(camera: &Camera, rectangle: &Rectangle) -> bool {
+    let sighting = Sighting { time_s: 0.0, rectangle: *rectangle };
+    height_of(camera, &sighting).is_none_or(|height_m| height_m < TALLEST_M)
+}
+
+fn height_of(camera: &Camera, sighting: &Sighting) -> Option<f64> {
+    let weight = PositionOptions::default().bottom_weight;
+    let midpoints = person_midpoints(std::slice::from_ref(sighting), camera).ok()?;
+    height_on_ground(camera, &midpoints, weight).ok()
+}
+
 /// True if a rectangle that stands on the ground can enclose a person: 1.0 to 2.4 m.
 pub(super) fn is_of_a_person(camera: &Camera, sighting: &Sighting) -> bool {
-    let weight = PositionOptions::default().bottom_weight;
-    let midpoints = person_midpoints(&[*sighting], camera).ok();
-    let height_m = midpoints.and_then(|midpoints| height_on_ground(camera, &midpoints, weight).ok());
-    height_m.is_some_and(|height_m| (1.0..2.4).contains(&height_m))
+    height_of(camera, sighting).is_some_and(|height_m| (1.0..TALLEST_M).contains(&height_m))
 }
 
 /// The height of a person whose rectangles stand on the ground; `average` walks with the share of the height by which
@@ -197,6 +210,23 @@ mod tests {
     }
 
     /// The first person is 1.70 ± 0.10 m tall, so everything beside is known to 6 %.
+    #[test]
+    fn two_people_one_behind_the_other_are_taller_than_one() {
+        let camera = Camera::level([640, 1000], 0.5, 7.0, 25.0).unwrap();
+        let person = |y: f64| {
+            let [sole, crown] = [0.0, 1.75].map(|z| camera.project(DVec3::new(0.2, y, z)).unwrap());
+            Rectangle {
+                left: sole.x as usize - 12,
+                right: sole.x as usize + 12,
+                top: crown.y as usize,
+                bottom: sole.y as usize,
+            }
+        };
+        let (near, far) = (person(0.0), person(8.0));
+        assert!(is_of_one_person(&camera, &near) && is_of_one_person(&camera, &far));
+        assert!(!is_of_one_person(&camera, &near.union(&far)));
+    }
+
     #[test]
     fn a_height_measured_against_another_person_s_is_no_better_known_than_that() {
         let scale_sd = BodyHeight::POPULATION.relative_sd();

@@ -60,7 +60,7 @@ pub struct TrackerOptions {
     /// Fit of the person's body and motion to all frames of a walk; `None` keeps the average.
     pub fit: Option<FitOptions>,
     /// Number of frames that must be followed before an oblique path is looked for. 40: one and a half strides at
-    /// 25 frames per second.
+    /// 25 frames per second. At lower rates fewer frames are enough, if they last as long.
     pub path_frames: usize,
     /// Whether the person walks on a treadmill; `None` finds out.
     pub treadmill: Option<bool>,
@@ -116,6 +116,12 @@ impl TrackerOptions {
         self.evidence.check()?;
         self.steady.map_or(Ok(()), |steady| steady.check())?;
         self.walk.check()
+    }
+
+    /// The time of [`path_frames`](Self::path_frames) frames at 25 frames per second: at lower rates, fewer frames show a
+    /// path as well.
+    pub(super) fn path_s(&self) -> f64 {
+        (self.path_frames as f64 - 1.0) / 25.0
     }
 
     /// The given height of a person, by order of appearance.

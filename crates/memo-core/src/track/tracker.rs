@@ -3,8 +3,8 @@
 //! 1. It looks for moving regions that could be people and that nobody explains who is followed already.
 //! 2. It starts on 13 frames of such a region ([`TrackerOptions::start_frames`]).
 //! 3. It follows both half-cycle twins with filters. Nearer people hide farther ones (`crowd`).
-//! 4. It looks for an oblique path once [`TrackerOptions::path_frames`] frames are followed, and for turns from then on
-//!    (`bend`).
+//! 4. It looks for an oblique path once [`TrackerOptions::path_frames`] frames are followed, or for as long at a low frame
+//!    rate, and for turns from then on (`bend`).
 //! 5. It ends the walk when the person leaves the image or stops walking, and fits the person to all its frames
 //!    ([`fit`](super::fit)). Whoever walks on where the person was expected has the same number (`people`).
 //!
@@ -34,7 +34,7 @@ use super::decisions::{OUTSIDE_SHARE, SAME_PLACE_M};
 use super::evidence::{Evidence, EvidenceError, EvidenceOptions, EvidenceStream};
 use super::fit::FitError;
 use super::fit::views::{Backdrop, Piece};
-use super::height::is_of_a_person;
+use super::height::{is_of_a_person, is_of_one_person};
 use super::left_out::{Hindrance, LeftOut, Reason, Unfollowed};
 use super::locate::Sighting;
 use super::options::TrackerOptions;
@@ -46,7 +46,7 @@ use super::steady::{CameraMotion, Loss};
 use super::walk::FrameEdges;
 use crate::OptionError;
 use crate::calibrate::{TiltError, TiltEstimate};
-use crate::image::{Frame, GroupOptions, LightReport, Mask, Rectangle, Sides, group_regions, regions};
+use crate::image::{Frame, GroupOptions, LightReport, Mask, Rectangle, Sides, group_regions_of, regions};
 use crate::model::body::BodyError;
 use crate::model::{Body, Camera, EllipticCylinder};
 use glam::DVec2;
@@ -104,8 +104,8 @@ pub enum TrackError {
 
 /// A walk of this many frames is returned and continues as a new walk.
 pub const LONGEST_WALK: usize = 20_000;
-/// At most this many candidates are kept at a time, the largest regions.
-const MOST_CANDIDATES: usize = 3;
+/// At most this many candidates are kept at a time, the largest regions: they bound the time that a frame takes.
+const MOST_CANDIDATES: usize = 8;
 /// A walk that is over is returned after this time, in which somebody may start where it ended, seconds.
 const FADING_S: f64 = 1.0;
 /// The same with a calibrated camera: the feet of somebody who turned into the line of sight show a walk later.
@@ -333,7 +333,10 @@ impl Tracker {
         let moving = given.map(Moving::of_size).unwrap_or_else(|| {
             let group = with_small_ones(&self.options.evidence.group);
             let options = EvidenceOptions { group, ..self.options.evidence };
-            Moving::new(evidence.candidates(&options), &self.options.evidence.group)
+            Moving::new(
+                evidence.candidates_of(&options, |r| self.can_be_one(r)),
+                &self.options.evidence.group,
+            )
         });
         let regions = &moving.regions;
         if self.options.camera.is_none() && self.tilt.is_none() && !regions.is_empty() {
@@ -448,7 +451,7 @@ impl Tracker {
     /// Settles path and person of somebody who was followed for long enough.
     fn settle(&mut self, k: usize) {
         let active = &self.people[k];
-        if active.settled || active.kept.len() < self.options.path_frames {
+        if active.settled || !active.shows_path(&self.options) {
             return;
         }
         if self.people.len() == 1 {
@@ -613,7 +616,12 @@ impl Tracker {
         }
         let group: &GroupOptions = &self.options.evidence.group;
         let parts = regions(&mask, group.min_part_area);
-        Moving::new(group_regions(&parts, &with_small_ones(group)), group)
+        Moving::new(group_regions_of(&parts, &with_small_ones(group), |r| self.can_be_one(r)), group)
+    }
+
+    /// False if a rectangle is too tall for one person who stands on the ground of a given camera.
+    fn can_be_one(&self, rectangle: &Rectangle) -> bool {
+        self.options.camera.as_ref().is_none_or(|camera| is_of_one_person(camera, rectangle))
     }
 
     /// What a candidate shows in a frame, without the edges of people who are followed.

@@ -2,7 +2,6 @@
 
 mod outcome;
 
-use super::super::decisions::{MOST_MISSED, MOST_RESIDUAL};
 use super::edge_search::{Border, Reach, View};
 use super::lines::{Figure, Sample, Workspace, gradient, row_of, samples};
 use super::seen::{LEAST_STEP, Seen};
@@ -201,8 +200,8 @@ impl<'a> Problem<'a> {
     /// The result of a fit, unless it ended in a wrong place.
     pub(super) fn checked(&self, fitted: &Fitted, p_swapped: f64) -> Result<WalkFit, FitError> {
         let quality = self.quality(fitted);
-        let residual = quality.residual_px / quality.height_px;
-        if quality.missed > MOST_MISSED || residual > MOST_RESIDUAL {
+        if quality.is_misfit() {
+            let residual = quality.residual_px / quality.height_px;
             return Err(FitError::Misfit { missed: quality.missed, residual });
         }
         Ok(self.result(fitted, p_swapped, quality))

@@ -1,7 +1,8 @@
 //! How well the model fits the person.
 
 use super::super::decisions::{
-    MOST_SOLE_M, POORLY_CROWN, POORLY_MISSED, POORLY_OFF, WELL_LENGTH_SD, WELL_MISSED,
+    MOST_MISSED, MOST_RESIDUAL, MOST_RESIDUAL_PX, MOST_SOLE_M, POORLY_CROWN, POORLY_MISSED, POORLY_OFF,
+    WELL_LENGTH_SD, WELL_MISSED,
 };
 use crate::model::body::{PART_COUNT, Part};
 
@@ -62,6 +63,12 @@ impl FitVerdict {
 }
 
 impl FitQuality {
+    /// True if the fit is of something else or ended in a wrong place.
+    pub(super) fn is_misfit(&self) -> bool {
+        let most_px = (MOST_RESIDUAL * self.height_px).max(MOST_RESIDUAL_PX);
+        self.missed > MOST_MISSED || self.residual_px > most_px
+    }
+
     /// The verdict.
     #[must_use]
     pub fn verdict(&self) -> FitVerdict {
@@ -124,6 +131,20 @@ mod tests {
         crown_off: Some(0.004),
         parts: [Some(PartQuality { share: 1.0 / 14.0, missed: 0.01, residual_px: Some(0.7) }); PART_COUNT],
     };
+
+    #[test]
+    fn a_small_person_may_be_off_by_pixels_and_a_large_one_by_a_share_of_the_height() {
+        for (height_px, residual_px, missed, is_misfit) in [
+            (75.0, 1.4, 0.1, false),
+            (75.0, 1.6, 0.1, true),
+            (300.0, 3.5, 0.1, false),
+            (300.0, 3.7, 0.1, true),
+            (75.0, 0.5, 0.21, true),
+        ] {
+            let quality = FitQuality { height_px, residual_px, missed, ..GOOD };
+            assert_eq!(quality.is_misfit(), is_misfit, "{height_px} {residual_px} {missed}");
+        }
+    }
 
     #[test]
     fn each_sign_of_a_bad_fit_lowers_the_verdict() {

@@ -211,12 +211,12 @@ fn sightings_do_not_pile_up_while_nobody_starts() {
 }
 
 #[test]
-fn up_to_three_regions_are_sought_at_a_time_the_largest_first() {
+fn up_to_eight_regions_are_sought_at_a_time_the_largest_first() {
     let mut tracker = tracker();
-    let boxes = [boxed(20, 449, 100, 300), person(150), boxed(260, 399, 80, 190), boxed(400, 399, 80, 180)];
+    let boxes: [Rectangle; 9] = std::array::from_fn(|k| boxed(10 + 70 * k, 399, 50, 250 - 10 * k));
     tracker.advance(&evidence(0, &boxes)).unwrap();
     let sought: Vec<Rectangle> = tracker.candidates.iter().map(|c| c.seen[0].sighting.rectangle).collect();
-    assert_eq!(sought, boxes[..3]);
+    assert_eq!(sought, boxes[..8]);
 }
 
 const PATH: Path = Path { origin: DVec2::ZERO, heading_rad: 0.0 };
