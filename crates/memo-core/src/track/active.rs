@@ -532,7 +532,8 @@ pub(super) mod tests {
     }
 
     fn frame_at(frame: usize, time_s: f64) -> FrameEdges {
-        FrameEdges { frame, time_s, window: WINDOW, edges: Vec::new(), others: Vec::new(), shared: false }
+        let (edges, others) = (Vec::new(), Vec::new());
+        FrameEdges { frame, time_s, window: WINDOW, edges, others, shared: false, newcomer: false }
     }
 
     #[test]

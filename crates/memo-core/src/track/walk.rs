@@ -57,9 +57,9 @@ const GROUND_SD_M: f64 = 0.02;
 const LEAST_VISIBLE: f32 = 0.05;
 
 /// What is measured beside somebody who may soon start counts as if this share of the person were visible: the standard
-/// deviation doubles. With 0.1 to 0.5, all three people of a drawn scene are followed with four sets of heights; with 1,
-/// some are lost. With 0.2 and 0.3, what is left over from one of 27 people who walk alone starts as somebody else; with
-/// 0.4 and 0.5 it does not.
+/// deviation doubles. Chosen on a drawn scene of three people, all of whom are followed with it with four sets of heights;
+/// with 1, some are lost in three of these. With 0.2 and 0.3, what is left over from one of 28 people who walk alone starts
+/// as somebody else; with 0.4 and 0.5 it does not.
 const BESIDE_NEWCOMER: f32 = 0.5;
 
 /// The filtered state of one twin.
@@ -348,7 +348,7 @@ fn match_frame(edges: &FrameEdges, scene: &Scene<'_>, predicted: &State, options
     let similarity = found.best_score();
     let visible = scene.visible_share(&predicted.hypothesis());
     let measured = (similarity > 0.0 && visible >= LEAST_VISIBLE).then(|| found.refined());
-    // A part of the contours measures less well than all of them, and edges of which some may be another's less well too.
+    // A part of the contours measures less well than all of them, and so do edges of which some may be another's.
     let trusted = if edges.newcomer { visible * BESIDE_NEWCOMER } else { visible };
     let filter = options.filter.of_visible_share(trusted.into());
     let state = measured.map_or(*predicted, |measured| predicted.update(&measured, &filter));

@@ -115,17 +115,14 @@ impl View {
         }
         // 2. The step at each of them.
         let fall = |w: &[f32]| (w[0] + w[1] - w[3] - w[4]) / SAMPLES as f32;
-        let windows = profile.grey.windows(2 * SAMPLES + 1);
+        let of_grey = profile.grey.windows(2 * SAMPLES + 1).map(fall);
         profile.steps.clear();
-        match background {
-            None => profile.steps.extend(windows.map(|grey| fall(grey).abs())),
-            Some(_) => {
-                let unlike = profile.unlike.windows(2 * SAMPLES + 1);
-                let both = windows.zip(unlike);
-                profile
-                    .steps
-                    .extend(both.map(|(grey, unlike)| (fall(unlike).max(0.0) * fall(grey).abs()).sqrt()));
-            }
+        if background.is_some() {
+            let of_unlike = profile.unlike.windows(2 * SAMPLES + 1).map(fall);
+            let both = of_grey.zip(of_unlike).map(|(grey, unlike)| (unlike.max(0.0) * grey.abs()).sqrt());
+            profile.steps.extend(both);
+        } else {
+            profile.steps.extend(of_grey.map(f32::abs));
         }
         // 3. The strongest, the less the farther it is.
         let steps = &profile.steps[..];
@@ -237,6 +234,20 @@ mod tests {
             assert!((x + edge.offset_px - 30.5).abs() < 0.3, "{edge:?} from {x}");
         }
         assert!(found(&alone, 44.0, Border::Outer).strength > 50.0, "an edge of the room, too");
+    }
+
+    #[test]
+    fn places_between_pixels_are_read_as_in_floating_point() {
+        let mut image = Image::filled(7, 5, 0u8);
+        for y in 0..5 {
+            (0..7).for_each(|x| image.row_mut(y)[x] = ((31 * x + 57 * y) % 256) as u8);
+        }
+        let (first, step) = (DVec2::new(0.3, 3.9), DVec2::new(0.41, -0.29));
+        for (n, place) in FixedPoint::line(first, step).take(14).enumerate() {
+            let wanted = image.as_frame().between(first + step * n as f64).unwrap();
+            let read = place.of(image.pixels(), image.width());
+            assert!((f64::from(read) - wanted).abs() < 1e-4, "{n}: {read} against {wanted}");
+        }
     }
 
     #[test]

@@ -93,8 +93,10 @@ impl StartGait {
     }
 }
 
-/// Share of its cost by which a start from another gait than the average must be nearer to the edges. Chosen; of a person in
-/// clothes that hardly differ from the background, the stiff knee was nearer by less in compressed pictures.
+/// Share of its cost by which a start from another gait than the average must be nearer to the edges. Of 18 drawn walks of
+/// ordinary gait the others are farther off by 2 % and more, but in one of 19, in clothes that hardly differ from the
+/// background, the crouched one is nearer by 5 %, and in compressed pictures of another in such clothes the stiff knee by 0.1
+/// and 1.3 %. Of people who walk so, crouched gait is nearer by 38 and 64 % and a stiff knee by 20 %.
 const LEAST_GAIN: f64 = 0.03;
 
 /// Steps from every starting gait, then steps with the person's curves, then with what single frames deviate.
