@@ -110,9 +110,6 @@ const FRAMES_AT_ONCE: usize = 64;
 /// distance from each other.
 const SAMPLES_PER_HEIGHT: f64 = 75.0;
 const LEAST_SPACING_PX: f64 = 2.0;
-/// In the steps from a starting gait, whose searches are the longest, samples are so many times as far apart, and each
-/// counts as so many.
-const FIRST_SPACING: f64 = 2.0;
 const LEAST_REACH_PX: f64 = 4.0;
 
 /// From which gait a fit starts is decided by this many frames at most, unless they are farther apart than this time, in
@@ -390,7 +387,7 @@ impl<'a> Problem<'a> {
                 continue;
             }
             let clear = edge.strength / (edge.strength + CLEAR_STEP);
-            let weight = width.spacing * importance * near * clear / width.sd_px().powi(2);
+            let weight = importance * near * clear / width.sd_px().powi(2);
             figure.motion(sample, motion);
             let n_j = gradient(self.camera, sample.world, sample.normal);
             terms.add(motion.iter().map(|(q, dx)| (*q, n_j.dot(*dx))), edge.offset_px, weight);
@@ -470,8 +467,6 @@ pub(super) struct Width {
     reach: Reach,
     scale_px: f64,
     height_px: f64,
-    /// Factor on the distance between samples, and on what one counts.
-    spacing: f64,
 }
 
 impl Width {
@@ -479,12 +474,11 @@ impl Width {
         let done = n as f64 / (STEPS.iter().sum::<usize>() - 1) as f64;
         let at = |[first, last]: [f64; 2]| height_px * (first + (last - first) * done);
         let reach = Reach::new(at(REACH).max(LEAST_REACH_PX));
-        let spacing = if n < STEPS[0] { FIRST_SPACING } else { 1.0 };
-        Self { reach, scale_px: at(SCALE).max(1.0), height_px, spacing }
+        Self { reach, scale_px: at(SCALE).max(1.0), height_px }
     }
 
     fn spacing_px(&self) -> f64 {
-        self.spacing * (self.height_px / SAMPLES_PER_HEIGHT).max(LEAST_SPACING_PX)
+        (self.height_px / SAMPLES_PER_HEIGHT).max(LEAST_SPACING_PX)
     }
 
     /// Standard deviation of the edge of one sample.
