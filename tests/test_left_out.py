@@ -130,7 +130,7 @@ def test_only_the_longest_are_told():
     left_out = [seen(10 + k, reason) for k, reason in enumerate(reasons)]
     said = left_out_sentences(left_out, 120)
     assert said[0] == "120 moving people or things were not followed. The 3 seen longest:"
-    assert len(said) == 4 and "over the ground" in said[1] and "three larger" in said[2]
+    assert len(said) == 4 and "over the ground" in said[1] and "eight larger" in said[2]
     assert all(left.sentence.endswith(".") for left in left_out)
     assert left_out_sentences([], 0) == []
 

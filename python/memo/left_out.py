@@ -142,6 +142,6 @@ _SENTENCES: dict[str, Callable[[LeftOut], str]] = {
         "few to start."
     ),
     "beside somebody": lambda left: "it was not told apart from somebody who was followed there.",
-    "too many": lambda left: "three larger regions moved at the same time; no more are looked at.",
+    "too many": lambda left: "eight larger regions moved at the same time; no more are looked at.",
     "over ground": lambda left: f"somebody {_moved(left)}",
 }

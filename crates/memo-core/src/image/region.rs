@@ -232,7 +232,8 @@ pub(crate) fn group_regions_of(
         let mut members = vec![parts.remove(0)];
         let mut whole = members[0].rectangle;
         while let Some(i) = parts.iter().position(|part| {
-            belongs(&whole, &part.rectangle, options) && can_be_one(&whole.union(&part.rectangle))
+            let joined = whole.union(&part.rectangle);
+            belongs(&whole, &part.rectangle, options) && (joined == whole || can_be_one(&joined))
         }) {
             whole = whole.union(&parts[i].rectangle);
             members.push(parts.remove(i));
@@ -418,7 +419,11 @@ pub(super) mod tests {
         let parts = [near.clone(), far.clone()];
         assert_eq!(group_regions(&parts, &GroupOptions::default()).len(), 1);
         let is_low = |whole: &Rectangle| whole.height() <= 100;
-        assert_eq!(group_regions_of(&parts, &GroupOptions::default(), is_low), [near, far]);
+        assert_eq!(group_regions_of(&parts, &GroupOptions::default(), is_low), [near.clone(), far]);
+        // What is inside a rectangle that is too tall already makes it no taller.
+        let parts = [block(100, 100, 30, 120), block(132, 150, 3, 10), block(100, 90, 35, 12)];
+        let whole = group_regions_of(&parts, &GroupOptions::default(), is_low);
+        assert!(whole.len() < 3, "{whole:?}");
     }
 
     #[test]

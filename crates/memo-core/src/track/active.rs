@@ -7,7 +7,7 @@ use super::decisions::{
 };
 use super::fit::of_walk::Tracked;
 use super::fit::views::{Backdrop, Piece};
-use super::fit::{FitError, WalkFit};
+use super::fit::{FitError, LEAST_FRAMES, WalkFit};
 use super::frontal::Frontal;
 use super::height::{BodyHeight, HeightSource};
 use super::locate::{Crown, Sighting, locate_slanting};
@@ -291,12 +291,13 @@ impl Active {
         if turns.iter().any(|turn| *turn != DVec3::ZERO) { turns } else { Vec::new() }
     }
 
-    /// True if path and person can be settled: so many frames were followed, or fewer of somebody who moves on, but for as
-    /// long. Who stays needs all of them for a start on the spot.
+    /// True if path and person can be settled: so many frames were followed, or as many as a fit needs of somebody who moves
+    /// on, but for as long. Who stays needs all of them for a start on the spot.
     pub(super) fn shows_path(&self, options: &TrackerOptions) -> bool {
         let ends = self.kept.first().zip(self.kept.last());
         let lasts_s = ends.map_or(0.0, |((_, first), (_, last))| last.time_s - first.time_s);
-        self.kept.len() >= options.path_frames || lasts_s >= options.path_s() && self.moves_on()
+        let is_long = self.kept.len() >= LEAST_FRAMES && lasts_s >= options.path_s();
+        self.kept.len() >= options.path_frames || is_long && self.moves_on()
     }
 
     /// Starts again with smaller steps if the phase stands still, on an oblique path if the kept frames show one, and with
@@ -527,7 +528,8 @@ pub(super) mod tests {
             active.shows_path(&options)
         };
         assert!(!followed(39, 0.04, 1.2) && followed(40, 0.04, 1.2), "25 frames per second");
-        assert!(!followed(11, 0.143, 1.2) && followed(12, 0.143, 1.2), "7 frames per second");
+        assert!(!followed(19, 0.083, 1.2) && followed(20, 0.083, 1.2), "12 frames per second");
+        assert!(!followed(14, 0.143, 1.2) && followed(15, 0.143, 1.2), "what a fit needs");
         assert!(!followed(39, 0.143, 0.1) && followed(40, 0.143, 0.1), "who stays");
     }
 

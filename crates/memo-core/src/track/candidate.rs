@@ -90,7 +90,7 @@ impl Candidate {
 
     /// True if it was in the last frame and no start was refused: what was refused may be a part of somebody who is
     /// followed.
-    pub fn may_start(&self) -> bool {
+    pub fn is_newcomer(&self) -> bool {
         self.missed == 0 && !self.refused
     }
 
@@ -541,12 +541,12 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn a_candidate_may_start_until_a_start_is_refused() {
+    fn a_candidate_is_newcomer_until_a_start_is_refused() {
         let mut candidate = Candidate { seen: seen_walking(1.3), ..Candidate::default() };
-        assert!(candidate.may_start());
-        assert!(!Candidate { missed: 1, seen: seen_walking(1.3), ..Candidate::default() }.may_start());
+        assert!(candidate.is_newcomer());
+        assert!(!Candidate { missed: 1, seen: seen_walking(1.3), ..Candidate::default() }.is_newcomer());
         candidate.refuse(&TrackerOptions::default());
-        assert!(!candidate.may_start());
+        assert!(!candidate.is_newcomer());
     }
 
     #[test]

@@ -140,8 +140,10 @@ pub(in crate::track) const MOST_RESIDUAL: f64 = 0.012;
 /// its 34 walks are 0.8 to 1.49 off, miss up to 0.14, and are on somebody in 0.7 and more of their frames; others were given up
 /// for being farther off, on a person in 20 to 80 % of them. In another crowd, a fit that is on nobody is 1.5 off and misses
 /// 0.19. Both margins are thin. All these walks count as poor fits.
+/// Nobody in these clips is smaller than 50 pixels.
 pub(in crate::track) const MOST_RESIDUAL_PX: f64 = 1.5;
 pub(in crate::track) const MOST_MISSED_OF_SMALL: f64 = 0.15;
+pub(in crate::track) const LEAST_OF_SMALL_PX: f64 = 50.0;
 /// A fit that misses more of the outline, or is farther from the edges by a share of the height, is a poor one.
 pub(in crate::track) const POORLY_MISSED: f64 = 0.1;
 pub(in crate::track) const POORLY_OFF: f64 = 0.007;

@@ -131,10 +131,12 @@ impl BodyHeight {
     }
 }
 
-/// False if a rectangle that stands on the ground is taller than a person.
+/// False if a rectangle that stands on the ground is taller than a person; where it reaches down to the border of the picture,
+/// its feet may be below.
 pub(super) fn is_of_one_person(camera: &Camera, rectangle: &Rectangle) -> bool {
     let sighting = Sighting { time_s: 0.0, rectangle: *rectangle };
-    height_of(camera, &sighting).is_none_or(|height_m| height_m < TALLEST_M)
+    let is_cut = rectangle.bottom + 2 >= camera.size[1] as usize;
+    is_cut || height_of(camera, &sighting).is_none_or(|height_m| height_m < TALLEST_M)
 }
 
 fn height_of(camera: &Camera, sighting: &Sighting) -> Option<f64> {
@@ -209,7 +211,6 @@ mod tests {
         BodyHeight { height_m, sd_m: 0.04, source: HeightSource::Measured, scale_sd: 0.0 }
     }
 
-    /// The first person is 1.70 ± 0.10 m tall, so everything beside is known to 6 %.
     #[test]
     fn two_people_one_behind_the_other_are_taller_than_one() {
         let camera = Camera::level([640, 1000], 0.5, 7.0, 25.0).unwrap();
@@ -225,8 +226,11 @@ mod tests {
         let (near, far) = (person(0.0), person(8.0));
         assert!(is_of_one_person(&camera, &near) && is_of_one_person(&camera, &far));
         assert!(!is_of_one_person(&camera, &near.union(&far)));
+        let cut = Rectangle { bottom: 998, ..near.union(&far) };
+        assert!(is_of_one_person(&camera, &cut), "the feet are below the picture");
     }
 
+    /// The first person is 1.70 ± 0.10 m tall, so everything beside is known to 6 %.
     #[test]
     fn a_height_measured_against_another_person_s_is_no_better_known_than_that() {
         let scale_sd = BodyHeight::POPULATION.relative_sd();

@@ -104,7 +104,7 @@ pub enum TrackError {
 
 /// A walk of this many frames is returned and continues as a new walk.
 pub const LONGEST_WALK: usize = 20_000;
-/// At most this many candidates are kept at a time, the largest regions: they bound the time that a frame takes.
+/// At most this many regions are looked at in a frame, the largest: they bound its time.
 const MOST_CANDIDATES: usize = 8;
 /// A walk that is over is returned after this time, in which somebody may start where it ended, seconds.
 const FADING_S: f64 = 1.0;
@@ -423,7 +423,7 @@ impl Tracker {
                 &meeting.iter().map(|&other| &expected[other]).collect::<Vec<_>>(),
             );
             edges.shared = !meeting.is_empty();
-            edges.newcomer = self.candidates.iter().any(|it| it.may_start() && it.is_in(&own.window));
+            edges.newcomer = self.candidates.iter().any(|it| it.is_newcomer() && it.is_in(&own.window));
             edges.others.clone_from(&others);
             // 3. A rectangle that nobody else is in.
             let overlaps = |region: &&Rectangle| region.gap(&own.window) == [0, 0];

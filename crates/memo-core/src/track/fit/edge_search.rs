@@ -62,6 +62,7 @@ impl Reach {
 /// A step is the difference between the means of this many samples on either side, one pixel apart.
 const SAMPLES: usize = 2;
 
+const _: () = assert!(SAMPLES == 2, "the sums of a search are written out");
 /// More than the rounding of a [`FixedPoint`].
 const ROUNDING_PX: f64 = 1e-6;
 
@@ -104,6 +105,7 @@ impl View {
         match background {
             None => profile.grey.iter_mut().zip(places).for_each(|(at, place)| *at = place.of(grey, width)),
             Some(behind) => {
+                debug_assert_eq!(behind.width(), width);
                 let behind = &behind.pixels()[..grey.len()];
                 profile.unlike.resize(count, 0.0);
                 let profile = profile.grey.iter_mut().zip(&mut profile.unlike);

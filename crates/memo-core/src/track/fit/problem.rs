@@ -93,11 +93,11 @@ impl StartGait {
     }
 }
 
-/// Share of its cost by which a start from another gait than the average must be nearer to the edges. Of 18 drawn walks of
-/// ordinary gait the others are farther off by 2 % and more, but in one of 19, in clothes that hardly differ from the
-/// background, the crouched one is nearer by 5 %, and in compressed pictures of another in such clothes the stiff knee by 0.1
-/// and 1.3 %. Of people who walk so, crouched gait is nearer by 38 and 64 % and a stiff knee by 20 %.
-const LEAST_GAIN: f64 = 0.03;
+/// Share of its cost by which a start from another gait than the average must be nearer to the edges. Of 19 drawn walks of
+/// ordinary gait the others are farther off by 2 % and more in 18; in one, in clothes that hardly differ from the background,
+/// the crouched one is nearer by 5 %. In compressed pictures of another in such clothes, the stiff knee is nearer by 0.1 and
+/// 1.3 %. Of people who walk so, crouched gait is nearer by 38 and 64 % and a stiff knee by 20 %.
+const LEAST_GAIN: f64 = 0.1;
 
 /// Steps from every starting gait, then steps with the person's curves, then with what single frames deviate.
 const STEPS: [usize; 3] = [4, 4, 4];
@@ -105,6 +105,7 @@ const STEPS: [usize; 3] = [4, 4, 4];
 /// the first and at the last step.
 const REACH: [f64; 2] = [0.06, 0.02];
 const SCALE: [f64; 2] = [0.03, 0.008];
+/// So many frames' normal equations are in memory at a time.
 const FRAMES_AT_ONCE: usize = 64;
 /// Sample points per body height. Their edges err together, so each counts with a standard deviation of their
 /// distance from each other.
@@ -112,7 +113,7 @@ const SAMPLES_PER_HEIGHT: f64 = 75.0;
 const LEAST_SPACING_PX: f64 = 2.0;
 const LEAST_REACH_PX: f64 = 4.0;
 
-/// From which gait a fit starts is decided by this many frames at most, unless they are farther apart than this time, in
+/// From which gait a fit starts is decided by at most this many frames, about evenly spaced, but by at least one in so many
 /// seconds: steps take half a second.
 const FEW_FRAMES: usize = 24;
 const FEW_S: f64 = 0.125;
@@ -226,7 +227,7 @@ impl<'a> Problem<'a> {
         Some((self.started(phase, gait)?.1, gait))
     }
 
-    /// The same with every second, third ... frame, so that there are about [`FEW_FRAMES`], but at least one in [`FEW_S`].
+    /// The same with every second, third ... frame, so that there are at most [`FEW_FRAMES`], but at least one in [`FEW_S`].
     fn of_few_frames(&self) -> Self {
         let count = self.frames.len();
         let ends = self.frames.first().zip(self.frames.last());
@@ -591,7 +592,7 @@ impl FigureTerms {
         let PartTerms { slopes: values, normal, right, .. } = &mut self.part;
         values.clear();
         values.extend(slopes.map(|(_, slope)| slope));
-        for ((row, right), a) in normal.chunks_exact_mut(values.len()).zip(right).zip(values.iter()) {
+        for ((row, right), a) in normal.chunks_exact_mut(values.len().max(1)).zip(right).zip(values.iter()) {
             add_scaled(row, values, weight * a);
             *right += weight * a * offset;
         }

@@ -1,8 +1,8 @@
 //! How well the model fits the person.
 
 use super::super::decisions::{
-    MOST_MISSED, MOST_MISSED_OF_SMALL, MOST_RESIDUAL, MOST_RESIDUAL_PX, MOST_SOLE_M, POORLY_CROWN,
-    POORLY_MISSED, POORLY_OFF, WELL_LENGTH_SD, WELL_MISSED,
+    LEAST_OF_SMALL_PX, MOST_MISSED, MOST_MISSED_OF_SMALL, MOST_RESIDUAL, MOST_RESIDUAL_PX, MOST_SOLE_M,
+    POORLY_CROWN, POORLY_MISSED, POORLY_OFF, WELL_LENGTH_SD, WELL_MISSED,
 };
 use crate::model::body::{PART_COUNT, Part};
 
@@ -66,7 +66,9 @@ impl FitQuality {
     /// True if the fit is of something else or ended in a wrong place.
     pub(super) fn is_misfit(&self) -> bool {
         let is_near = self.residual_px <= MOST_RESIDUAL * self.height_px;
-        let is_near_of_small = self.residual_px <= MOST_RESIDUAL_PX && self.missed <= MOST_MISSED_OF_SMALL;
+        let is_near_of_small = self.residual_px <= MOST_RESIDUAL_PX
+            && self.missed <= MOST_MISSED_OF_SMALL
+            && self.height_px >= LEAST_OF_SMALL_PX;
         self.missed > MOST_MISSED || !(is_near || is_near_of_small)
     }
 
@@ -141,6 +143,7 @@ mod tests {
             (300.0, 3.5, 0.1, false),
             (300.0, 3.7, 0.1, true),
             (75.0, 1.4, 0.16, true),
+            (49.0, 1.4, 0.1, true),
             (75.0, 0.5, 0.19, false),
             (75.0, 0.5, 0.21, true),
         ] {
