@@ -110,13 +110,10 @@ def test_phase_and_sides_are_those_captured(judged, name, adapt):
     assert evaluation.sides.right == 1 and evaluation.sides.surely_wrong == 0
 
 
-@pytest.mark.parametrize(("adapt", "hip_deg", "knee_deg"), [(False, 9.2, 14), (True, 4, 7)])
+@pytest.mark.parametrize(("adapt", "hip_deg", "knee_deg"), [(False, 9, 14), (True, 4, 7)])
 @pytest.mark.parametrize("name", MOCAP)
 def test_leg_angles_are_those_captured(judged, name, adapt, hip_deg, knee_deg):
-    """On the average gait as well as that gait fits these joints; fitted to the person, twice as well.
-
-    At the true phase the average curves miss the joints of drawn walks by 7.6 to 9.2 degrees at the hip.
-    """
+    """On the average gait as well as that gait fits these joints; fitted to the person, twice as well."""
     angles = judged(name, adapt).angles_deg
     for side in ("right", "left"):
         assert angles[f"{side}_hip"].rms <= hip_deg

@@ -534,8 +534,7 @@ pub(super) mod tests {
     }
 
     fn frame_at(frame: usize, time_s: f64) -> FrameEdges {
-        let (edges, others) = (Vec::new(), Vec::new());
-        FrameEdges { frame, time_s, window: WINDOW, edges, others, shared: false, newcomer: false }
+        FrameEdges::of_one_alone(frame, time_s, WINDOW, Vec::new())
     }
 
     #[test]
@@ -729,15 +728,7 @@ pub(super) mod tests {
                     time_s,
                     rectangle: rectangle_of(&walker, &camera, &seen.at(along_m), along_m),
                 }),
-                FrameEdges {
-                    frame: k,
-                    time_s,
-                    window: WINDOW,
-                    edges,
-                    others: Vec::new(),
-                    shared: false,
-                    newcomer: false,
-                },
+                FrameEdges::of_one_alone(k, time_s, WINDOW, edges),
             )
         };
         (0..count).map(frame).collect()

@@ -135,14 +135,14 @@ pub(in crate::track) const MOST_MISSED_TO_ADOPT: f64 = 0.1;
 /// fits of 60 walkers missed up to 0.15 and were up to 0.0064 off.
 pub(in crate::track) const MOST_MISSED: f64 = 0.2;
 pub(in crate::track) const MOST_RESIDUAL: f64 = 0.012;
-/// A fit that is less off, pixels, is one however small the person, unless it misses more of its outline: filmed people are
-/// blurred by compression. The pixels were chosen on the only clip of people so small, a filmed crowd of 50 to 150 pixels:
-/// its 34 walks are 0.8 to 1.49 off, miss up to 0.14, and are on somebody in 0.7 and more of their frames; others were given up
-/// for being farther off, on a person in 20 to 80 % of them. In another crowd, a fit that is on nobody is 1.5 off and misses
-/// 0.19. Both margins are thin. All these walks count as poor fits.
-/// Nobody in these clips is smaller than 50 pixels.
+/// A fit of a small person that is less off, pixels, is one too, unless it misses more of its outline: filmed people are
+/// blurred by compression. Chosen on the only clip of people so small, a filmed crowd of 50 to 150 pixels: the 35 walks that
+/// one version kept were 0.8 to 1.49 off and on somebody in 0.7 and more of their frames, and 34 of them missed up to 0.14;
+/// others, given up for being farther off, were on a person in 20 to 80 % of them. In another crowd, a fit that is on nobody is
+/// 1.5 off and misses 0.19. Both margins are thin, and all these fits count as poor ones.
 pub(in crate::track) const MOST_RESIDUAL_PX: f64 = 1.5;
 pub(in crate::track) const MOST_MISSED_OF_SMALL: f64 = 0.15;
+/// Nobody in these clips is smaller.
 pub(in crate::track) const LEAST_OF_SMALL_PX: f64 = 50.0;
 /// A fit that misses more of the outline, or is farther from the edges by a share of the height, is a poor one.
 pub(in crate::track) const POORLY_MISSED: f64 = 0.1;

@@ -605,15 +605,7 @@ mod tests {
         let [column, bottom] = [sole.x.round() as usize, (sole.y + MASK_MARGIN_PX).round() as usize];
         let rectangle = Rectangle { left: column - 30, right: column + 30, top: bottom - 200, bottom };
         let (window, time_s) = (rectangle, FRAME_S * k as f64);
-        let edges = FrameEdges {
-            frame: k,
-            time_s,
-            window,
-            edges: vec![],
-            others: vec![],
-            shared: false,
-            newcomer: false,
-        };
+        let edges = FrameEdges::of_one_alone(k, time_s, window, vec![]);
         (Some(Sighting { time_s, rectangle }), edges)
     }
 

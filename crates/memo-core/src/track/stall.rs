@@ -91,15 +91,7 @@ mod tests {
             let along_m = -0.5 + 0.6 * time_s;
             let edges = edges_of(&scene, &Hypothesis { along_m, height_m, phase: phase(k) });
             let rectangle = rectangle_of(&walker, &camera, &PATH, along_m);
-            let edges = FrameEdges {
-                frame: k,
-                time_s,
-                window: rectangle,
-                edges,
-                others: Vec::new(),
-                shared: false,
-                newcomer: false,
-            };
+            let edges = FrameEdges::of_one_alone(k, time_s, rectangle, edges);
             (Some(Sighting { time_s, rectangle }), edges)
         };
         (0..40).map(frame).collect()

@@ -423,7 +423,7 @@ impl Tracker {
                 &meeting.iter().map(|&other| &expected[other]).collect::<Vec<_>>(),
             );
             edges.shared = !meeting.is_empty();
-            edges.newcomer = self.candidates.iter().any(|it| it.is_newcomer() && it.is_in(&own.window));
+            edges.newcomer = self.candidates.iter().any(|candidate| candidate.is_newcomer(&own.window));
             edges.others.clone_from(&others);
             // 3. A rectangle that nobody else is in.
             let overlaps = |region: &&Rectangle| region.gap(&own.window) == [0, 0];
@@ -653,7 +653,7 @@ impl Tracker {
     ) -> Result<FrameEdges, TrackError> {
         let edges = evidence.edges(window, camera, &self.options.evidence)?.lines;
         let (frame, time_s, window) = (evidence.frame, evidence.time_s, *window);
-        Ok(FrameEdges { frame, time_s, window, edges, others: Vec::new(), shared: false, newcomer: false })
+        Ok(FrameEdges::of_one_alone(frame, time_s, window, edges))
     }
 
     /// The given camera, or the one assumed for somebody who is followed.

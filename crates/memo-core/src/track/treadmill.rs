@@ -220,15 +220,7 @@ mod tests {
             let edges = edges_of(&scene, &Hypothesis { along_m, height_m, phase: 0.3 + rate_hz * time_s });
             (
                 Some(Sighting { time_s, rectangle: rectangle_of(&walker, &camera, &path, along_m) }),
-                FrameEdges {
-                    frame: k,
-                    time_s,
-                    window,
-                    edges,
-                    others: Vec::new(),
-                    shared: false,
-                    newcomer: false,
-                },
+                FrameEdges::of_one_alone(k, time_s, window, edges),
             )
         };
         Standing { kept: (0..12).map(frame).collect(), ..Standing::default() }
@@ -295,15 +287,7 @@ mod tests {
 
     fn edges(frame: usize) -> FrameEdges {
         let window = Rectangle { left: 10, top: 10, right: 60, bottom: 90 };
-        FrameEdges {
-            frame,
-            time_s: 0.04 * frame as f64,
-            window,
-            edges: Vec::new(),
-            others: Vec::new(),
-            shared: false,
-            newcomer: false,
-        }
+        FrameEdges::of_one_alone(frame, 0.04 * frame as f64, window, Vec::new())
     }
 
     #[test]

@@ -200,6 +200,13 @@ pub struct FrameEdges {
     pub newcomer: bool,
 }
 
+impl FrameEdges {
+    /// The edges near a person who is alone.
+    pub fn of_one_alone(frame: usize, time_s: f64, window: Rectangle, edges: Vec<EdgeLine>) -> Self {
+        Self { frame, time_s, window, edges, others: Vec::new(), shared: false, newcomer: false }
+    }
+}
+
 /// A person being followed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Walk {
@@ -422,27 +429,11 @@ mod tests {
     fn planted(frame: usize, time_s: f64) -> FrameEdges {
         let (walker, camera) = (walker(), camera());
         let edges = edges_of(&Scene::new(&walker, &camera, &PATH), &truth(time_s));
-        FrameEdges {
-            frame,
-            time_s,
-            window: WINDOW,
-            edges,
-            others: Vec::new(),
-            shared: false,
-            newcomer: false,
-        }
+        FrameEdges::of_one_alone(frame, time_s, WINDOW, edges)
     }
 
     fn empty(frame: usize, time_s: f64) -> FrameEdges {
-        FrameEdges {
-            frame,
-            time_s,
-            window: WINDOW,
-            edges: Vec::new(),
-            others: Vec::new(),
-            shared: false,
-            newcomer: false,
-        }
+        FrameEdges::of_one_alone(frame, time_s, WINDOW, Vec::new())
     }
 
     /// Filter noise that differs between coordinates.

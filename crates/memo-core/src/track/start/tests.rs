@@ -216,15 +216,7 @@ fn planted(forward: bool, rate_hz: f64) -> (Vec<FrameEdges>, Course, Camera) {
         };
         let edges = edges_of(&Scene::new(&walker, &camera, &path), &hypothesis);
         let window = Rectangle { left: 0, top: 0, right: 639, bottom: 479 };
-        FrameEdges {
-            frame: 10 + k,
-            time_s: 7.0 + elapsed_s,
-            window,
-            edges,
-            others: Vec::new(),
-            shared: false,
-            newcomer: false,
-        }
+        FrameEdges::of_one_alone(10 + k, 7.0 + elapsed_s, window, edges)
     };
     let frames = (0..5).map(frame).collect();
     (frames, course, camera)
