@@ -19,6 +19,7 @@ use super::start::{StartReport, start};
 use super::steady::CameraMotion;
 use super::walk::{Beginning, FrameEdges, Step, Twin, Walk};
 use crate::calibrate::TiltEstimate;
+use crate::image::Sides;
 use crate::model::body::PART_COUNT;
 use crate::model::{Camera, EllipticCylinder, Walker};
 use glam::DVec3;
@@ -127,6 +128,25 @@ impl Active {
     /// The scene near a place along the route.
     pub(super) fn scene(&self, along_m: f64) -> Scene<'_> {
         Scene::new(&self.walk.walker, &self.camera, &self.walk.route.at(along_m))
+    }
+
+    /// How far the bodies of this walk and of another overlap in the image in the frames of both, on average (intersection
+    /// over union of their boxes); 0 without such frames.
+    pub(super) fn overlap(&self, other: &Self) -> f64 {
+        let others: HashMap<usize, &Step> = other.steps().iter().map(|step| (step.frame, step)).collect();
+        let both = self.steps().iter().filter_map(|step| Some((step, *others.get(&step.frame)?)));
+        let overlaps: Vec<f64> = both
+            .filter_map(|(here, there)| Some(self.box_in(here)?.overlap(&other.box_in(there)?)))
+            .collect();
+        if overlaps.is_empty() { 0.0 } else { overlaps.iter().sum::<f64>() / overlaps.len() as f64 }
+    }
+
+    /// The box of the body in the image.
+    fn box_in(&self, step: &Step) -> Option<Sides> {
+        let hypothesis = step.state.hypothesis();
+        let body = self.scene(hypothesis.along_m).pose(&hypothesis).cylinders;
+        let [low, high] = body_box(&self.camera, &body)?;
+        Some(Sides { left: low.x, top: low.y, right: high.x, bottom: high.y })
     }
 
     /// The body in the last frame.
@@ -635,6 +655,20 @@ pub(super) mod tests {
         assert!(ending(40, 1.2, 0.9, border - 0.005).is_over());
         assert!(!ending(40, 1.2, 0.9, border + 0.005).is_over());
         assert!(ending(40, 1.2, 0.9, 0.0).is_over());
+    }
+
+    #[test]
+    fn bodies_overlap_in_the_frames_of_both() {
+        let walk = |from: usize, ahead_m: f64| {
+            let at = |k: usize| [ahead_m + 1.2 * FRAME_S * k as f64, 0.9 * FRAME_S * k as f64];
+            active((from..from + 20).map(|k| step(k, at(k), 0.5)).collect())
+        };
+        let first = walk(0, 0.0);
+        assert!((first.overlap(&walk(10, 0.0)) - 1.0).abs() < 1e-9);
+        let beside = first.overlap(&walk(0, 0.3));
+        assert!((0.2..0.7).contains(&beside), "{beside}");
+        assert_eq!(first.overlap(&walk(0, 3.0)), 0.0, "elsewhere");
+        assert_eq!(first.overlap(&walk(20, 0.0)), 0.0, "later");
     }
 
     #[test]

@@ -30,7 +30,7 @@ mod unfollowed;
 use super::active::Active;
 use super::candidate::{Candidate, Given, MISSED_FRAMES, Seen};
 use super::crowd::{Expected, body_box, clear_explained, expected, keep_own, keep_unowned};
-use super::decisions::{OUTSIDE_SHARE, SAME_PLACE_M};
+use super::decisions::{OUTSIDE_SHARE, SAME_BODY, SAME_PLACE_M};
 use super::evidence::{Evidence, EvidenceError, EvidenceOptions, EvidenceStream};
 use super::fit::FitError;
 use super::fit::views::{Backdrop, Piece};
@@ -719,12 +719,13 @@ impl Tracker {
         if self.people.iter().any(is_beside) { all.div_ceil(2) } else { all }
     }
 
-    /// False if somebody is followed where a walk would start.
+    /// False if somebody is followed where a walk would start: on the ground or, as far as distances are known badly, in
+    /// the picture.
     fn is_somebody_else(&self, new: &Active) -> bool {
         let place = |active: &Active| active.sign().map(|sign| sign.place_m);
         let near =
             |other: &Active| place(other).zip(place(new)).is_some_and(|(a, b)| a.distance(b) < SAME_PLACE_M);
-        !self.people.iter().any(near)
+        !self.people.iter().any(|other| near(other) || new.overlap(other) > SAME_BODY)
     }
 
     /// True if the changes were left over from somebody who turned: that person's contours are more similar on a curve.
