@@ -6,20 +6,23 @@
 //! a(s) = Σ_j c_j P_j(2 s / L - 1),   j = 0 .. 6
 //! ```
 //!
-//! at the length s of L, with the Legendre polynomials P_j, and turned there by a'(s). With body, gait and places held,
-//! each step solves for the c_j that bring the contours to the edges.
+//! at the length s of L, with the Legendre polynomials P_j, and turned there by a'(s):
+//!
+//! 1. Before the fit, with body and curves held, two steps solve for the c_j that bring the contours to the edges.
+//! 2. Then the c_j are unknowns of the fit, beside body and curves. A nearer and a taller person have nearly the same
+//!    contours, so while one of the two is held, the other hardly moves.
+//!
+//! Solved for from the first step on, with edges searched far, the ends of a route ran off the person in 5 of 12 drawn walks.
 
 use super::FitOptions;
 use super::lines::Figure;
 use super::problem::{FitFrame, Problem, Room, Width};
-use super::unknowns::{ACROSS, ALONG, FIGURE, HEADING, Unknowns};
+use super::unknowns::{ACROSS, ALONG, BEND, FIGURE, HEADING, Unknowns, WHOLE_BEND};
 use crate::model::{Camera, Walker};
 use crate::track::route::Route;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-/// Number of coefficients.
-const COUNT: usize = 7;
 /// Standard deviations of what the tracker's route is off: place, metres, heading, radians, and curvature, 1/m, which is
 /// another one every metre.
 const PLACE_SD_M: f64 = 0.3;
@@ -27,9 +30,62 @@ const HEADING_SD_RAD: f64 = 0.2;
 const CURVATURE_SD: f64 = 0.15;
 /// Distance of the points of a moved route, metres.
 const POINTS_M: f64 = 0.1;
-
-/// Number of steps.
+/// How often the route is moved before the fit.
 const STEPS: usize = 2;
+
+/// Where the sideways movement of a route is described: between these lengths along it, metres.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Bend {
+    ends_m: [f64; 2],
+}
+
+impl Bend {
+    /// The bend of a route between these lengths; `None` if they are the same.
+    pub fn between([a, b]: [f64; 2]) -> Option<Self> {
+        (a != b).then_some(Self { ends_m: [a.min(b), a.max(b)] })
+    }
+
+    /// P_j at a length along the route, and its first two derivatives by that length.
+    pub fn terms(&self, along_m: f64) -> [[f64; 3]; BEND] {
+        sideways(along_m, self.ends_m)
+    }
+
+    /// a, a' and a'' at a length along the route.
+    pub fn at(&self, whole: &[f64], along_m: f64) -> [f64; 3] {
+        let coefficients = &whole[WHOLE_BEND..][..BEND];
+        let terms = self.terms(along_m);
+        std::array::from_fn(|n| terms.iter().zip(coefficients).map(|(of, c)| of[n] * c).sum())
+    }
+
+    /// What is known of the coefficients before the contours are seen: combinations with their precisions, whose mean is 0.
+    pub fn priors(&self) -> Vec<([f64; BEND], f64)> {
+        let length_m = self.ends_m[1] - self.ends_m[0];
+        let one = |j: usize| std::array::from_fn(|n| if n == j { 1.0 } else { 0.0 });
+        let turned = (HEADING_SD_RAD * 0.5 * length_m).powi(-2);
+        let mut rows = vec![(one(0), PLACE_SD_M.powi(-2)), (one(1), turned)];
+        rows.extend((0..CURVATURES).map(|k| {
+            let along_m = self.ends_m[0] + length_m * (k as f64 + 0.5) / CURVATURES as f64;
+            let curvature = self.terms(along_m).map(|of| of[2]);
+            (curvature, length_m / CURVATURES as f64 / CURVATURE_SD.powi(2))
+        }));
+        rows
+    }
+
+    /// The route moved sideways, as far as from the one to the other of `whole_m` at least; lengths along it begin where they
+    /// did.
+    pub fn moved(&self, whole: &[f64], route: &Route, whole_m: [f64; 2]) -> Option<Route> {
+        let [a, b] = whole_m;
+        let [from_m, to_m] = [a.min(b).min(self.ends_m[0]), a.max(b).max(self.ends_m[1])];
+        let count = ((to_m - from_m) / POINTS_M).ceil() as usize;
+        let point = |k: usize| {
+            let along_m = from_m + (to_m - from_m) * k as f64 / count as f64;
+            let tangent = route.at(along_m);
+            let [left_m, ..] = self.at(whole, along_m);
+            tangent.point(along_m, 0.0).truncate() + left_m * tangent.direction().perp()
+        };
+        Route::through(&(0..=count).map(point).collect::<Vec<_>>(), from_m)
+    }
+}
 
 /// The route of somebody who turned, moved until the contours lie on the edges, and the frames on it; a straight route
 /// as it is. The way goes from one of `ends_m` to the other.
@@ -43,9 +99,8 @@ pub(crate) fn fitted_route(
 ) -> Route {
     let mut route = route.clone();
     for _ in 0..if route.is_straight() { 0 } else { STEPS } {
-        let Some(next) = Problem::new(camera, walker, &route, frames, options).moved_route(ends_m) else {
-            break;
-        };
+        let problem = Problem::new(camera, walker, &route, frames, options);
+        let Some(next) = problem.moved_route(ends_m) else { break };
         for frame in frames.iter_mut() {
             let along_m = frame.start.along_m;
             frame.start.along_m = next.along(route.place(along_m), along_m);
@@ -57,51 +112,42 @@ pub(crate) fn fitted_route(
 }
 
 impl Problem<'_> {
-    /// The route after one step; `None` if the contours do not determine one.
-    fn moved_route(&self, whole_m: [f64; 2]) -> Option<Route> {
-        let (unknowns, _) = self.best_start(0.0)?;
-        let ends = [0, unknowns.frames.len() - 1].map(|k| self.along(&unknowns.frames[k]));
-        let length_m = ends[1] - ends[0];
-        // 1. The normal equations of the coefficients.
+    /// The route after one step in which body and curves are held; `None` if the contours do not determine one.
+    fn moved_route(&self, ends_m: [f64; 2]) -> Option<Route> {
+        let bend = self.bend()?;
+        let (mut unknowns, _) = self.best_start(0.0)?;
         let width = self.last_start_width(&unknowns)?;
+        // 1. The normal equations of the coefficients.
         let terms: Vec<_> = (0..unknowns.frames.len())
             .into_par_iter()
-            .map_init(Room::default, |room, k| self.sideways_terms(&unknowns, k, ends, &width, room))
+            .map_init(Room::default, |room, k| self.bend_terms(&bend, &unknowns, k, &width, room))
             .collect();
-        let mut normal = DMatrix::<f64>::zeros(COUNT, COUNT);
-        let mut right = DVector::<f64>::zeros(COUNT);
+        let mut normal = DMatrix::<f64>::zeros(BEND, BEND);
+        let mut right = DVector::<f64>::zeros(BEND);
         for (of_frame, right_of_frame) in &terms {
             normal += of_frame;
             right += right_of_frame;
         }
         // 2. The route moved by them.
-        let coefficients = most_probable(normal, &right, length_m)?;
-        let [from_m, to_m] =
-            if length_m > 0.0 { [whole_m[0].min(ends[0]), whole_m[1].max(ends[1])] } else { ends };
-        let count = ((to_m - from_m).abs() / POINTS_M).ceil() as usize;
-        let point = |k: usize| {
-            let along_m = from_m + (to_m - from_m) * k as f64 / count as f64;
-            let left_m: f64 =
-                sideways(along_m, ends).iter().zip(&coefficients).map(|(of, c)| of[0] * c).sum();
-            let tangent = self.route().at(along_m);
-            tangent.point(along_m, 0.0).truncate() + left_m * tangent.direction().perp()
-        };
-        Route::through(&(0..=count).map(point).collect::<Vec<_>>(), from_m)
+        let coefficients = most_probable(normal, &right, &bend)?;
+        unknowns.whole[WHOLE_BEND..][..BEND].copy_from_slice(coefficients.as_slice());
+        bend.moved(&unknowns.whole, self.route(), ends_m)
     }
 
     /// Normal equations of the coefficients in one frame.
-    fn sideways_terms(
+    fn bend_terms(
         &self,
+        bend: &Bend,
         unknowns: &Unknowns,
         frame: usize,
-        ends: [f64; 2],
         width: &Width,
         room: &mut Room,
     ) -> (DMatrix<f64>, DVector<f64>) {
         let (figure, normal, right, _) = self.figure_terms(unknowns, frame, width, room);
-        let mut slopes = DMatrix::<f64>::zeros(FIGURE, COUNT);
-        for (j, of) in sideways(self.along(&unknowns.frames[frame]), ends).into_iter().enumerate() {
-            for (coordinate, slope) in figure_slopes(&figure, of) {
+        let mut slopes = DMatrix::<f64>::zeros(FIGURE, BEND);
+        for (j, [moved, turned, _]) in bend.terms(self.along(&unknowns.frames[frame])).into_iter().enumerate()
+        {
+            for (coordinate, slope) in figure_slopes(&figure, [moved, turned]) {
                 slopes[(coordinate, j)] = slope;
             }
         }
@@ -110,31 +156,21 @@ impl Problem<'_> {
     }
 }
 
+/// The coefficients, from what the contours and the priors say.
+fn most_probable(mut contours: DMatrix<f64>, right: &DVector<f64>, bend: &Bend) -> Option<DVector<f64>> {
+    for (row, precision) in bend.priors() {
+        let row = DVector::from_row_slice(&row);
+        contours += precision * &row * row.transpose();
+    }
+    Some(contours.cholesky()?.solve(right))
+}
+
 /// What a figure that moves to the left and turns about its pelvis does in its coordinates, where the heading turns it
 /// about the origin.
-fn figure_slopes(figure: &Figure, [moved, turned, _]: [f64; 3]) -> [(usize, f64); 3] {
+pub(super) fn figure_slopes(figure: &Figure, [moved, turned]: [f64; 2]) -> [(usize, f64); 3] {
     let from_origin = figure.pelvis.truncate() - figure.origin;
     let [ahead_m, left_m] = [figure.ahead, figure.ahead.perp()].map(|axis| from_origin.dot(axis));
     [(ACROSS, moved - ahead_m * turned), (ALONG, left_m * turned), (HEADING, turned)]
-}
-
-/// The coefficients after a step, from what the contours say and the prior.
-fn most_probable(contours: DMatrix<f64>, right: &DVector<f64>, length_m: f64) -> Option<DVector<f64>> {
-    Some((contours + prior(length_m)).cholesky()?.solve(right))
-}
-
-/// The precision of the coefficients before the contours are seen.
-fn prior(length_m: f64) -> DMatrix<f64> {
-    let mut precision = DMatrix::<f64>::zeros(COUNT, COUNT);
-    precision[(0, 0)] = PLACE_SD_M.powi(-2);
-    precision[(1, 1)] = (HEADING_SD_RAD * 0.5 * length_m).powi(-2);
-    for k in 0..CURVATURES {
-        let along_m = length_m * (k as f64 + 0.5) / CURVATURES as f64;
-        let curvature = DVector::from_iterator(COUNT, sideways(along_m, [0.0, length_m]).map(|of| of[2]));
-        precision +=
-            &curvature * curvature.transpose() * (length_m.abs() / CURVATURES as f64 / CURVATURE_SD.powi(2));
-    }
-    precision
 }
 
 /// Number of places at which the prior looks at the curvature.
@@ -142,13 +178,13 @@ const CURVATURES: usize = 50;
 
 /// P_j at a length along the route, and its first two derivatives by that length, for every coefficient; beyond the ends
 /// as at them.
-fn sideways(along_m: f64, [first_m, last_m]: [f64; 2]) -> [[f64; 3]; COUNT] {
+fn sideways(along_m: f64, [first_m, last_m]: [f64; 2]) -> [[f64; 3]; BEND] {
     let rate = 2.0 / (last_m - first_m);
     let x = (rate * (along_m - first_m) - 1.0).clamp(-1.0, 1.0);
     // j P_j = (2 j - 1) x P_(j-1) - (j - 1) P_(j-2), and its derivatives.
-    let mut p = [[0.0; 3]; COUNT];
+    let mut p = [[0.0; 3]; BEND];
     (p[0], p[1]) = ([1.0, 0.0, 0.0], [x, 1.0, 0.0]);
-    for j in 2..COUNT {
+    for j in 2..BEND {
         let (k, [a, b]) = (j as f64, [p[j - 1], p[j - 2]]);
         let of = |n: usize| {
             let raised = x * a[n] + if n > 0 { n as f64 * a[n - 1] } else { 0.0 };
@@ -174,7 +210,7 @@ mod tests {
             // As printed by Abramowitz and Stegun, table 22.9.
             let p5 = (63.0 * x.powi(5) - 70.0 * x.powi(3) + 15.0 * x) / 8.0;
             assert!((at[5][0] - p5).abs() < 1e-12);
-            for j in 0..COUNT {
+            for j in 0..BEND {
                 let slope = (after[j][0] - before[j][0]) / 2e-4;
                 let curvature = (after[j][0] - 2.0 * at[j][0] + before[j][0]) / 1e-8;
                 assert!((at[j][1] - slope).abs() < 1e-5, "{along_m}, {j}");
@@ -184,38 +220,63 @@ mod tests {
         assert_eq!(sideways(-9.0, ends)[3], sideways(-1.0, ends)[3], "beyond the end as at the end");
     }
 
+    fn cost(bend: &Bend, coefficients: &[f64; BEND]) -> f64 {
+        let product = |row: &[f64; BEND]| row.iter().zip(coefficients).map(|(a, b)| a * b).sum::<f64>();
+        bend.priors().iter().map(|(row, precision)| precision * product(row).powi(2)).sum()
+    }
+
     #[test]
     fn before_anything_is_seen_a_bend_is_as_unlikely_as_its_curvature() {
         let length_m = 5.0_f64;
-        // A parabola with the curvature of one standard deviation everywhere, in five independent metres.
-        let parabola = CURVATURE_SD * (0.5 * length_m).powi(2) / 3.0;
-        let mut coefficients = DVector::<f64>::zeros(COUNT);
-        coefficients[2] = parabola;
-        let cost = (coefficients.transpose() * prior(length_m) * &coefficients)[(0, 0)];
-        assert!((cost - 5.0).abs() < 1e-9, "{cost}");
-        coefficients[2] = 0.0;
-        coefficients[0] = PLACE_SD_M;
-        let cost = (coefficients.transpose() * prior(length_m) * &coefficients)[(0, 0)];
-        assert!((cost - 1.0).abs() < 1e-9, "{cost}");
+        for bend in [[-1.0, 4.0], [4.0, -1.0]].map(|ends_m| Bend::between(ends_m).unwrap()) {
+            // A parabola with the curvature of one standard deviation everywhere, in five independent metres.
+            let mut coefficients = [0.0; BEND];
+            coefficients[2] = CURVATURE_SD * (0.5 * length_m).powi(2) / 3.0;
+            assert!((cost(&bend, &coefficients) - 5.0).abs() < 1e-9);
+            let mut coefficients = [0.0; BEND];
+            coefficients[0] = PLACE_SD_M;
+            assert!((cost(&bend, &coefficients) - 1.0).abs() < 1e-9);
+            coefficients = [0.0; BEND];
+            coefficients[1] = HEADING_SD_RAD * 0.5 * length_m;
+            assert!((cost(&bend, &coefficients) - 1.0).abs() < 1e-9);
+        }
+        assert_eq!(Bend::between([1.0, 1.0]), None);
     }
 
     /// Contours that show the place of the first half metre alone, 2 cm to the left to a centimetre.
     #[test]
     fn a_route_of_which_the_contours_show_the_beginning_goes_on_as_it_did() {
-        let length_m = 5.0;
-        let (mut normal, mut right) = (DMatrix::<f64>::zeros(COUNT, COUNT), DVector::<f64>::zeros(COUNT));
+        let bend = Bend::between([0.0, 5.0]).unwrap();
+        let (mut normal, mut right) = (DMatrix::<f64>::zeros(BEND, BEND), DVector::<f64>::zeros(BEND));
         for k in 0..10 {
-            let at =
-                DVector::from_iterator(COUNT, sideways(0.05 * k as f64, [0.0, length_m]).map(|of| of[0]));
+            let at = DVector::from_iterator(BEND, bend.terms(0.05 * k as f64).map(|of| of[0]));
             normal += &at * at.transpose() / 0.01f64.powi(2);
             right += 0.02 * at / 0.01f64.powi(2);
         }
-        let found = most_probable(normal, &right, length_m).unwrap();
-        let at = |along_m: f64, n: usize| -> f64 {
-            sideways(along_m, [0.0, length_m]).iter().zip(&found).map(|(of, c)| of[n] * c).sum()
+        let mut whole = vec![0.0; WHOLE_BEND + BEND];
+        whole[WHOLE_BEND..].copy_from_slice(most_probable(normal, &right, &bend).unwrap().as_slice());
+        let [left_m, ..] = bend.at(&whole, 0.25);
+        assert!((left_m - 0.02).abs() < 0.005, "{left_m}");
+        let [left_m, turned, _] = bend.at(&whole, 4.9);
+        assert!(left_m.abs() < 0.3 && turned.abs() < 0.1, "{left_m} {turned}");
+    }
+
+    /// On a circle about the origin of 2 m, 10 cm to the left are a circle of 1.9 m, on which lengths are shorter.
+    #[test]
+    fn a_moved_route_has_lengths_of_its_own() {
+        let circle = |radius_m: f64| {
+            let point = |k: usize| radius_m * DVec2::from_angle(0.05 * k as f64);
+            Route::through(&(0..60).map(point).collect::<Vec<_>>(), 0.0).unwrap()
         };
-        assert!((at(0.25, 0) - 0.02).abs() < 0.005, "{}", at(0.25, 0));
-        assert!(at(4.9, 0).abs() < 0.3 && at(4.9, 1).abs() < 0.1, "{} {}", at(4.9, 0), at(4.9, 1));
+        let bend = Bend::between([0.0, 5.0]).unwrap();
+        let mut whole = vec![0.0; WHOLE_BEND + BEND];
+        whole[WHOLE_BEND] = 0.1;
+        let moved = bend.moved(&whole, &circle(2.0), [0.5, 5.5]).unwrap();
+        for length_m in [0.5, 2.0, 4.5] {
+            let (found, wanted) = (moved.place(length_m), circle(1.9).place(length_m));
+            assert!(found.distance(wanted) < 0.01, "{length_m}: {found} {wanted}");
+            assert!((moved.at(length_m).heading_rad - circle(1.9).at(length_m).heading_rad).abs() < 0.02);
+        }
     }
 
     #[test]
@@ -228,7 +289,7 @@ mod tests {
         let point = DVec3::new(1.5, -0.1, 1.3);
         let (ahead, left) = (ahead.extend(0.0), ahead.perp().extend(0.0));
         for (moved, turned) in [(1.0, 0.0), (0.0, 1.0), (0.4, -0.8)] {
-            let slopes = figure_slopes(&figure, [moved, turned, 0.0]);
+            let slopes = figure_slopes(&figure, [moved, turned]);
             let motion: DVec3 = slopes
                 .iter()
                 .map(|&(coordinate, slope)| {

@@ -54,14 +54,18 @@ pub const TAPERS: usize = WIDTHS + 8;
 /// Number of coordinates of the body.
 pub const BODY_COUNT: usize = TAPERS + 5;
 
+/// Coefficients of what the route of a person who turns is off ([`Bend`](super::route::Bend)).
+pub const BEND: usize = 7;
+
 /// Unknowns of the whole: the body, then lean, heading, place across the path, cosine and sine of the pelvis's rotation
-/// and of its sway to the left, then the series of the tilts and of the joint curves.
+/// and of its sway to the left, the bend of the route, then the series of the tilts and of the joint curves.
 pub const WHOLE_LEAN: usize = BODY_COUNT;
 pub const WHOLE_HEADING: usize = BODY_COUNT + 1;
 pub const WHOLE_ACROSS: usize = BODY_COUNT + 2;
 pub const WHOLE_PELVIS: usize = BODY_COUNT + 3;
 pub const WHOLE_SWAY: usize = BODY_COUNT + 5;
-pub const WHOLE_TILTS: usize = BODY_COUNT + 7;
+pub const WHOLE_BEND: usize = BODY_COUNT + 7;
+pub const WHOLE_TILTS: usize = WHOLE_BEND + BEND;
 pub const WHOLE_SERIES: usize = WHOLE_TILTS + LEG * TILT_TERMS;
 /// Number of unknowns of the whole.
 pub const WHOLE: usize = WHOLE_SERIES + series_start(JOINTS);

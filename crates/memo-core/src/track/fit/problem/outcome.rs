@@ -6,7 +6,7 @@ use super::super::super::decisions::{
 };
 use super::super::unknowns::{
     self, ANGLES, FRAME, FRAME_ALONG, FRAME_HEIGHT, FRAME_PHASE, JOINTS, Prior, STATURE, TORSO, Unknowns,
-    WHOLE, WHOLE_ACROSS, WHOLE_HEADING, WHOLE_LEAN, body, posture, slopes,
+    WHOLE, WHOLE_ACROSS, WHOLE_BEND, WHOLE_HEADING, WHOLE_LEAN, body, posture, slopes,
 };
 use super::super::{FitQuality, FittedFrame, Measured, PartQuality, WalkFit, belt, contacts};
 use super::{Fitted, Problem};
@@ -68,12 +68,15 @@ impl Problem<'_> {
     pub(super) fn result(&self, fitted: &Fitted, p_swapped: f64, quality: FitQuality) -> WalkFit {
         let Unknowns { whole, frames } = &fitted.unknowns;
         let (turn, left_m) = (whole[WHOLE_HEADING], whole[WHOLE_ACROSS]);
-        let route = self.route.moved(self.origin, self.origin_along_m, turn, left_m);
+        let ends_m = [0, frames.len() - 1].map(|k| self.along(&frames[k]));
+        let bent = self.bend.and_then(|bend| bend.moved(whole, self.route, ends_m));
+        let route = bent.as_ref().unwrap_or(self.route);
+        let route = route.moved(self.origin, self.origin_along_m, turn, left_m);
         let frame = |k: usize| {
             let figure = self.figure(&fitted.unknowns, k);
             let frame = FittedFrame {
                 torso_centre: figure.posed.torso_centre,
-                heading_rad: self.tangent(&frames[k]).heading_rad + turn,
+                heading_rad: self.heading_at(whole, self.along(&frames[k])),
                 along_m: route.along(figure.posed.torso_centre.truncate(), frames[k][FRAME_ALONG]),
                 phase: frames[k][FRAME_PHASE],
                 posture: posture(&self.walker.gait, whole, &frames[k]),
@@ -160,17 +163,16 @@ impl Problem<'_> {
             (SD_FACTOR * fitted.solution.variance(whole, frames).sqrt()).hypot(common)
         };
         let half_torso = 0.5 * height_m;
+        let mut across = vec![(WHOLE_ACROSS, 1.0), (WHOLE_HEADING, along_m)];
+        let bend = self.bend.map(|bend| bend.terms(self.origin_along_m + along_m));
+        across.extend(bend.iter().flatten().enumerate().map(|(j, [moved, ..])| (WHOLE_BEND + j, *moved)));
         [
             sd(
                 &[(WHOLE_LEAN, half_m * lean.cos()), (TORSO, half_torso * lean.sin())],
                 &at(FRAME_ALONG),
                 FIT_PLACE_SD[0],
             ),
-            sd(
-                &[(WHOLE_ACROSS, 1.0), (WHOLE_HEADING, along_m)],
-                &[],
-                FIT_PLACE_SD[1].hypot(OFF_ACROSS_SD_M * fitted.seen.off()),
-            ),
+            sd(&across, &[], FIT_PLACE_SD[1].hypot(OFF_ACROSS_SD_M * fitted.seen.off())),
             sd(&[(TORSO, half_torso * lean.cos())], &at(FRAME_HEIGHT), FIT_PLACE_SD[2]),
             sd(&[], &at(FRAME_PHASE), FIT_PLACE_SD[3]),
         ]
