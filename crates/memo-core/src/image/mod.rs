@@ -16,6 +16,7 @@ pub(crate) mod outline;
 pub(crate) mod region;
 pub(crate) mod runs;
 pub(crate) mod shrink;
+mod side_by_side;
 pub(crate) mod silhouette;
 
 pub use background::{Background, BackgroundError, BackgroundOptions};
@@ -35,6 +36,7 @@ pub(crate) use region::group_regions_of;
 pub use region::{GroupOptions, Rectangle, Region, Sides, group_regions, regions};
 pub use runs::Run;
 pub use shrink::shrunk;
+pub(crate) use side_by_side::side_by_side;
 pub use silhouette::{SILHOUETTE_THRESHOLD, SilhouetteError, silhouettes};
 // Public at the top of the crate alone.
 pub(crate) use frame::{Frame, Image, Mask};

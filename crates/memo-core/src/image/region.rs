@@ -127,7 +127,7 @@ pub struct Region {
 
 impl Region {
     /// From at least one run, in any order; no two may overlap.
-    fn from_runs(mut runs: Vec<Run>) -> Self {
+    pub(super) fn from_runs(mut runs: Vec<Run>) -> Self {
         runs.sort_unstable();
         let rectangle = enclosing(&runs).unwrap_or(Rectangle { left: 0, top: 0, right: 0, bottom: 0 });
         let area = runs.iter().map(|run| run.end - run.start).sum();

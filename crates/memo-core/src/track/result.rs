@@ -5,8 +5,8 @@
 //! observed distance of measurements from predictions. Two errors that do not average out over frames are added:
 //! the difference between the person's body and the model, and the distance.
 
-use super::decisions::ACROSS_SD_M;
-use super::decisions::COMMON_PHASE_SD;
+use super::crowd::body_box;
+use super::decisions::{ACROSS_SD_M, COMMON_PHASE_SD, SAME_BODY};
 use super::event::EventKind;
 use super::fit::contacts::Contact;
 use super::fit::{FitError, FittedFrame, Measured, WalkFit};
@@ -17,9 +17,11 @@ use super::start::{Direction, StartReport};
 use super::walk::{Step, Walk, WalkOptions};
 use crate::calibrate::TiltEstimate;
 use crate::estimate::kalman::{ConstantVelocity, FilterOptions, Noise, smooth};
+use crate::image::Sides;
 use crate::model::{Camera, PosedBody, Posture, SideJoints, Walker};
 use glam::{DVec2, DVec3};
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 
 use crate::model::skeleton::Side;
 
@@ -174,6 +176,30 @@ impl TrackedWalk {
     /// Steps of the better twin: measurements and filtered states.
     pub fn steps(&self) -> &[Step] {
         &self.walk.twins[self.walk.best()].steps
+    }
+
+    /// True if the body lies on that of another walk in the image, on average over at least half of its frames.
+    pub(super) fn lies_on(&self, other: &Self) -> bool {
+        let frame = |step: Option<&Step>| step.map_or(0, |step| step.frame);
+        let [(a, b), (c, d)] =
+            [self, other].map(|walk| (frame(walk.steps().first()), frame(walk.steps().last())));
+        if a > d || c > b {
+            return false;
+        }
+        let [own, others] = [self, other].map(Self::boxes);
+        let overlaps: Vec<f64> =
+            own.iter().filter_map(|(frame, sides)| Some(sides.overlap(others.get(frame)?))).collect();
+        let mean = overlaps.iter().sum::<f64>() / overlaps.len().max(1) as f64;
+        2 * overlaps.len() >= own.len() && mean > SAME_BODY
+    }
+
+    /// The box of the body in the image in each frame.
+    fn boxes(&self) -> BTreeMap<usize, Sides> {
+        let of_row = |(k, row): (usize, &Row)| {
+            let [low, high] = body_box(&self.camera, &self.pose_of(k, row).cylinders)?;
+            Some((row.frame, Sides { left: low.x, top: low.y, right: high.x, bottom: high.y }))
+        };
+        self.rows().iter().enumerate().filter_map(of_row).collect()
     }
 
     /// One row per frame.

@@ -36,7 +36,7 @@ use super::fit::FitError;
 use super::fit::views::{Backdrop, Piece};
 use super::height::{is_of_a_person, is_of_one_person};
 use super::left_out::{Hindrance, LeftOut, Reason, Unfollowed};
-use super::locate::Sighting;
+use super::locate::{Sighting, same_person};
 use super::options::TrackerOptions;
 pub use super::people::Now;
 use super::people::{Identities, Sign};
@@ -46,7 +46,9 @@ use super::steady::{CameraMotion, Loss};
 use super::walk::FrameEdges;
 use crate::OptionError;
 use crate::calibrate::{TiltError, TiltEstimate};
-use crate::image::{Frame, GroupOptions, LightReport, Mask, Rectangle, Sides, group_regions_of, regions};
+use crate::image::{
+    Frame, GroupOptions, LightReport, Mask, Rectangle, Region, Sides, group_regions_of, regions, side_by_side,
+};
 use crate::model::body::BodyError;
 use crate::model::{Body, Camera, EllipticCylinder};
 use glam::DVec2;
@@ -106,6 +108,8 @@ pub enum TrackError {
 pub const LONGEST_WALK: usize = 20_000;
 /// At most this many regions are looked at in a frame, the largest: they bound its time.
 const MOST_CANDIDATES: usize = 8;
+/// People are sought apart after they have been side by side in so many frames in a row.
+const APART_FRAMES: usize = 4;
 /// A walk that is over is returned after this time, in which somebody may start where it ended, seconds.
 const FADING_S: f64 = 1.0;
 /// The same with a calibrated camera: the feet of somebody who turned into the line of sight show a walk later.
@@ -139,6 +143,8 @@ pub struct Tracker {
     stream: EvidenceStream,
     backdrop: Backdrop,
     candidates: Vec<Candidate>,
+    /// The regions of the last frame in which people seem to be side by side, and for how many frames they have been.
+    side_by_side: Vec<(Rectangle, usize)>,
     /// Everybody who is followed.
     people: Vec<Active>,
     /// Walks that are over, and since when. Somebody may start there again.
@@ -174,6 +180,7 @@ impl Tracker {
             stream,
             backdrop: Backdrop::default(),
             candidates: Vec::new(),
+            side_by_side: Vec::new(),
             people: Vec::new(),
             fading: Vec::new(),
             identities: Identities::default(),
@@ -303,6 +310,7 @@ impl Tracker {
         }
         self.unfollowed.finish(self.options.start_frames);
         self.candidates.clear();
+        self.side_by_side.clear();
         self.standing = Standing::default();
         self.tilt = None;
         self.identities.forget_ended();
@@ -330,21 +338,25 @@ impl Tracker {
         let expected = self.expect(evidence);
         let given = self.given_boxes(evidence);
         let are_given = given.is_some();
-        let moving = given.map(Moving::of_size).unwrap_or_else(|| {
-            let group = with_small_ones(&self.options.evidence.group);
-            let options = EvidenceOptions { group, ..self.options.evidence };
-            Moving::new(
-                evidence.candidates_of(&options, |r| self.can_be_one(r)),
-                &self.options.evidence.group,
-            )
-        });
+        // People side by side are sought apart, but somebody who is followed alone has the whole region.
+        let (moving, apart) = match given {
+            Some(boxes) => (Moving::of_size(boxes.clone()), Moving::of_size(boxes)),
+            None => {
+                let group = with_small_ones(&self.options.evidence.group);
+                let options = EvidenceOptions { group, ..self.options.evidence };
+                let regions = evidence.candidates_of(&options, |r| self.can_be_one(r));
+                let apart = self.apart(regions.clone(), group.min_area);
+                let of = |regions| Moving::new(regions, &self.options.evidence.group);
+                (of(regions), of(apart))
+            }
+        };
         let regions = &moving.regions;
         if self.options.camera.is_none() && self.tilt.is_none() && !regions.is_empty() {
             self.tilt = Some(evidence.tilt(self.options.field_of_view_rad)?);
         }
         self.follow(evidence, &expected, regions)?;
         self.end_walks(evidence);
-        self.seek(evidence, moving, are_given)
+        self.seek(evidence, apart, are_given)
     }
 
     /// The boxes given for a frame, the largest first; `None` if none were given.
@@ -619,6 +631,31 @@ impl Tracker {
         Moving::new(group_regions_of(&parts, &with_small_ones(group), |r| self.can_be_one(r)), group)
     }
 
+    /// Regions divided where people have been side by side for some frames, largest first.
+    fn apart(&mut self, regions: Vec<Region>, min_area: usize) -> Vec<Region> {
+        let before = std::mem::take(&mut self.side_by_side);
+        let mut apart = Vec::new();
+        for region in regions {
+            let parts = side_by_side(region.clone());
+            let last = before.iter().filter(|(last, _)| same_person(last, &region.rectangle));
+            let frames = 1 + last.map(|(_, frames)| *frames).max().unwrap_or(0);
+            if parts.len() > 1 {
+                self.side_by_side.push((region.rectangle, frames));
+            }
+            if parts.len() > 1 && frames >= APART_FRAMES {
+                // What was seen of them as one thing belongs to neither.
+                if frames == APART_FRAMES {
+                    self.candidates.retain(|candidate| !candidate.is_at(&region.rectangle));
+                }
+                apart.extend(parts.into_iter().filter(|part| part.area >= min_area));
+            } else {
+                apart.push(region);
+            }
+        }
+        apart.sort_by_key(|region| std::cmp::Reverse(region.area));
+        apart
+    }
+
     /// False if a rectangle is too tall for one person who stands on the ground of a given camera.
     fn can_be_one(&self, rectangle: &Rectangle) -> bool {
         self.options.camera.as_ref().is_none_or(|camera| is_of_one_person(camera, rectangle))
@@ -750,7 +787,7 @@ impl Tracker {
         let started = self.started.remove(&active.person);
         let walk_boxes = walk_boxes(&active, started);
         if !active.is_walk() {
-            self.withdraw(&active, walk_boxes, Reason::NotWalking);
+            self.withdraw(active.person, walk_boxes, Reason::NotWalking);
             return;
         }
         let p_swapped = active.p_swapped(&self.options);
@@ -763,16 +800,13 @@ impl Tracker {
             let is_brief = is_left_over && is_short;
             let frames = active.steps().len();
             let reason = if is_brief { Reason::TooBrief { frames } } else { Reason::NotWalking };
-            self.withdraw(&active, walk_boxes, reason);
+            self.withdraw(active.person, walk_boxes, reason);
             return;
         }
-        walk_boxes.into_iter().for_each(|walk_boxes| self.unfollowed.followed(walk_boxes));
-        if let Some(sign) = standing.or_else(|| active.sign()) {
-            self.identities.end(active.person, sign);
-        }
+        let sign = standing.or_else(|| active.sign());
         let height = active.height_by(fit.as_ref().and_then(|fit| fit.as_ref().ok()));
         let is_frontal = active.is_frontal();
-        self.finished.push(TrackedWalk {
+        let walk = TrackedWalk {
             person: active.person,
             camera_turns: active.turns(self.stream.camera_motions()),
             crowns_px: active.crowns_px(),
@@ -788,7 +822,21 @@ impl Tracker {
             is_frontal,
             fit,
             options: self.options.walk,
-        });
+        };
+        // Two models can come to lie on one person, the fitted ones too: the one that was followed for longer stays.
+        let same = self.finished.iter().position(|other| walk.lies_on(other) || other.lies_on(&walk));
+        if same.is_some_and(|k| self.finished[k].steps().len() >= walk.steps().len()) {
+            self.withdraw(walk.person, walk_boxes, Reason::Beside);
+            return;
+        }
+        if let Some(double) = same.map(|k| self.finished.remove(k)) {
+            self.withdraw(double.person, None, Reason::Beside);
+        }
+        walk_boxes.into_iter().for_each(|walk_boxes| self.unfollowed.followed(walk_boxes));
+        if let Some(sign) = sign {
+            self.identities.end(walk.person, sign);
+        }
+        self.finished.push(walk);
     }
 }
 

@@ -317,3 +317,25 @@ fn an_assumed_height_widens_places_in_proportion_to_their_distance() {
         assert_eq!(known.torso_centre, assumed.torso_centre);
     }
 }
+
+#[test]
+fn a_walk_lies_on_another_where_their_bodies_overlap_in_half_of_its_frames() {
+    let frames = |ahead_m: f64, count: usize| -> Vec<(f64, Option<Hypothesis>)> {
+        let at = |k: usize| Hypothesis {
+            along_m: ahead_m + 0.048 * k as f64,
+            height_m: 1.2,
+            phase: 0.036 * k as f64,
+        };
+        (0..count).map(|k| (0.04 * k as f64, Some(at(k)))).collect()
+    };
+    let path = Path { origin: DVec2::ZERO, heading_rad: 0.0 };
+    let walk = |ahead_m: f64, count: usize| followed(path, &frames(ahead_m, count), WalkOptions::default());
+    let (long, short) = (walk(-0.5, 30), walk(-0.45, 12));
+    assert!(short.lies_on(&long) && !long.lies_on(&short), "the long one is elsewhere in most frames");
+    assert!(!walk(0.0, 12).lies_on(&long), "half a metre ahead");
+    let mut later = short.clone();
+    for step in later.walk.twins.iter_mut().flat_map(|twin| &mut twin.steps) {
+        step.frame += 100;
+    }
+    assert!(!later.lies_on(&long));
+}

@@ -90,9 +90,9 @@ impl Tracker {
     }
 
     /// Takes a walk back that was none.
-    pub(super) fn withdraw(&mut self, active: &Active, walk_boxes: Option<WalkBoxes>, reason: Reason) {
+    pub(super) fn withdraw(&mut self, person: usize, walk_boxes: Option<WalkBoxes>, reason: Reason) {
         self.report.refused_starts += 1;
-        self.identities.withdraw(active.person);
+        self.identities.withdraw(person);
         walk_boxes.into_iter().for_each(|walk_boxes| self.unfollowed.withdrawn(walk_boxes, reason));
     }
 }
