@@ -219,6 +219,32 @@ fn up_to_eight_regions_are_sought_at_a_time_the_largest_first() {
     assert_eq!(sought, boxes[..8]);
 }
 
+/// Two people whose feet touch are one thing at first, and then two; what was seen of the one thing is forgotten. A frame in
+/// which their trunks touch too begins anew.
+#[test]
+fn people_side_by_side_are_sought_apart_after_some_frames() {
+    let [left, right, feet, arms] = [
+        boxed(200, 399, 40, 220),
+        boxed(300, 399, 40, 200),
+        boxed(200, 399, 140, 15),
+        boxed(200, 280, 140, 20),
+    ];
+    let sought = |frames: usize, is_arm_in_arm: &dyn Fn(usize) -> bool| {
+        let mut tracker = tracker();
+        for k in 0..frames {
+            let boxes =
+                if is_arm_in_arm(k) { vec![left, right, feet, arms] } else { vec![left, right, feet] };
+            tracker.advance(&evidence(k, &boxes)).unwrap();
+        }
+        let of = |c: &Candidate| (c.seen.len(), c.last_rectangle().unwrap().width());
+        tracker.candidates.iter().map(of).collect::<Vec<_>>()
+    };
+    assert_eq!(sought(3, &|_| false), [(3, 140)]);
+    assert_eq!(sought(4, &|_| false), [(1, 70), (1, 70)]);
+    assert_eq!(sought(6, &|_| false), [(3, 70), (3, 70)]);
+    assert_eq!(sought(6, &|k| k == 2), [(6, 140)]);
+}
+
 const PATH: Path = Path { origin: DVec2::ZERO, heading_rad: 0.0 };
 const BEGINNING: Beginning =
     Beginning { time_s: 0.0, along_m: 0.0, phase: 0.2, speed_mps: 1.2, rate_hz: 0.9 };
