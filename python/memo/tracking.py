@@ -50,7 +50,8 @@ _WHOLE_NUMBERS = {"frame": np.int64, "walk": np.int64, "person": np.int64}
 class Tracker:
     """Tracks everybody who walks through a stream of frames, in bounded memory.
 
-    `height_m` is the body height from crown to sole, of everybody or of each person in order of appearance;
+    `height_m` is the body height from crown to sole, of everybody or of each person in order of appearance
+    (given `camera`, a person has the one that the image shows if that is clear);
     people beyond such a list are measured. None measures it in the image of `camera`; without a camera
     either, that of the population is assumed, and standard deviations and intervals of all lengths contain
     its spread. Without `camera`, one is assumed from the image size, the horizontal field of view

@@ -45,8 +45,9 @@ def add_track(app: "typer.Typer") -> None:
             str | None,
             typer.Option(
                 help="Height of the walker, metres, or of several people in order of appearance: 1.80,1.65. "
-                "Without it, heights are measured with --camera, and assumed to be 1.70 m, with a standard "
-                "deviation of 0.10 m, otherwise.",
+                "Given --camera, heights that differ clearly may be in any order. Without it, heights are "
+                "measured with --camera, and assumed to be 1.70 m, with a standard deviation of 0.10 m, "
+                "otherwise.",
                 metavar="METRES",
             ),
         ] = None,

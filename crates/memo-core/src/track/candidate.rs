@@ -158,6 +158,13 @@ impl Candidate {
         })
     }
 
+    /// The height that a calibrated camera shows, whatever was given.
+    pub fn seen_height(&self, options: &TrackerOptions, camera: &Camera) -> BodyHeight {
+        let mut sightings: Vec<Sighting> = self.seen.iter().map(|seen| seen.sighting).collect();
+        self.uncover_feet(&mut sightings);
+        start_height(options, None, Some(camera), &sightings)
+    }
+
     /// Gives the sightings whose feet somebody nearer may hide the lowest row of the tallest one: what ends above its feet
     /// would seem to stand farther away.
     fn uncover_feet(&self, sightings: &mut [Sighting]) {

@@ -44,8 +44,9 @@ pub struct TrackerOptions {
     /// Body height of the person, metres. `None` measures it in a calibrated camera; without one, that of the
     /// population is assumed ([`height`](super::height)).
     pub height_m: Option<f64>,
-    /// Body heights of further people in order of appearance, metres. If there are none, everybody has `height_m`;
-    /// otherwise people beyond the list are measured.
+    /// Body heights of further people in order of appearance, metres. In a given camera, a person has the one of the
+    /// heights that the image shows if that is clear. If there are none, everybody has `height_m`; otherwise people
+    /// beyond the list are measured.
     pub further_heights_m: Vec<f64>,
     /// The camera; `None` assumes one from field of view and body height.
     pub camera: Option<Camera>,
@@ -124,7 +125,7 @@ impl TrackerOptions {
         (self.path_frames as f64 - 1.0) / 25.0
     }
 
-    /// The given height of a person, by order of appearance.
+    /// The given height of a place in the list; of everybody if there is no list.
     pub fn height_of(&self, person: usize) -> Option<f64> {
         match person.checked_sub(1) {
             Some(further) if !self.further_heights_m.is_empty() => {

@@ -108,6 +108,9 @@ pub enum TrackError {
 pub const LONGEST_WALK: usize = 20_000;
 /// At most this many regions are looked at in a frame, the largest: they bound its time.
 const MOST_CANDIDATES: usize = 8;
+/// Given heights are put in another order than that of appearance if the picture is nearer to another one by so many standard
+/// deviations of what it shows.
+const CLEAR_SD: f64 = 2.0;
 /// People are sought apart after they have been side by side in so many frames in a row.
 const APART_FRAMES: usize = 4;
 /// A walk that is over is returned after this time, in which somebody may start where it ended, seconds.
@@ -145,6 +148,8 @@ pub struct Tracker {
     candidates: Vec<Candidate>,
     /// The regions of the last frame in which people seem to be side by side, and for how many frames they have been.
     side_by_side: Vec<(Rectangle, usize)>,
+    /// Which of the given heights each person has, in order of appearance.
+    order_of_heights: Vec<usize>,
     /// Everybody who is followed.
     people: Vec<Active>,
     /// Walks that are over, and since when. Somebody may start there again.
@@ -175,12 +180,14 @@ impl Tracker {
         options.check()?;
         let stream = options.evidence_stream();
         let longest_walk = options.fit.map_or(LONGEST_WALK, |fit| fit.longest.min(LONGEST_WALK));
+        let order_of_heights = (0..=options.further_heights_m.len()).collect();
         Ok(Self {
             options,
             stream,
             backdrop: Backdrop::default(),
             candidates: Vec::new(),
             side_by_side: Vec::new(),
+            order_of_heights,
             people: Vec::new(),
             fading: Vec::new(),
             identities: Identities::default(),
@@ -541,7 +548,7 @@ impl Tracker {
 
     /// People who may be back, and whose given heights are not that of the next person.
     fn of_other_height(&self, time_s: f64) -> Vec<usize> {
-        let height_m = |person: usize| self.options.height_of(person);
+        let height_m = |person: usize| self.given_height(person);
         let next_m = height_m(self.identities.count());
         let fading = self.fading.iter().map(|(_, old)| old.person);
         let mut people: Vec<usize> = fading.chain(self.identities.expected(time_s)).collect();
@@ -712,6 +719,8 @@ impl Tracker {
                 self.candidates.push(candidate);
                 continue;
             }
+            let order = self.order_of_heights.clone();
+            self.order_heights(&candidate);
             let begun = self.begun(&candidate, size).and_then(|active| {
                 let is_own = self.is_somebody_else(&active) && !self.is_left_over(&active);
                 if is_own { Ok(active) } else { Err(Reason::Beside) }
@@ -724,6 +733,7 @@ impl Tracker {
                     self.people.push(active);
                 }
                 Err(reason) => {
+                    self.order_of_heights = order;
                     self.report.refused_starts += 1;
                     let last = candidate.last_rectangle();
                     last.iter().for_each(|r| self.unfollowed.refuse(evidence.frame, r, reason));
@@ -734,12 +744,34 @@ impl Tracker {
         }
     }
 
+    /// The given height of a person; `None` if it is to be measured.
+    fn given_height(&self, person: usize) -> Option<f64> {
+        self.options.height_of(self.order_of_heights.get(person).copied().unwrap_or(person))
+    }
+
+    /// Gives the next person the one of the heights of nobody yet that a calibrated camera shows, if that is clearly not the
+    /// first of them.
+    fn order_heights(&mut self, candidate: &Candidate) {
+        let next = self.identities.count();
+        let Some(camera) = &self.options.camera else { return };
+        let Some(left) = self.order_of_heights.get(next..).filter(|left| left.len() > 1) else { return };
+        let seen = candidate.seen_height(&self.options, camera);
+        let off_m = |k: usize| {
+            let given = self.options.height_of(left[k]);
+            given.map_or(f64::INFINITY, |height_m| (height_m - seen.height_m).abs())
+        };
+        let nearest = (0..left.len()).min_by(|&a, &b| off_m(a).total_cmp(&off_m(b)));
+        if let Some(k) = nearest.filter(|&k| off_m(0) > off_m(k) + CLEAR_SD * seen.sd_m) {
+            self.order_of_heights[next..=next + k].rotate_right(1);
+        }
+    }
+
     /// The walk of a candidate, with the height of its person: of somebody who is expected back and is back with it, or
     /// of the next one.
     fn begun(&self, candidate: &Candidate, size: [u32; 2]) -> Result<Active, Reason> {
         let begin = |person: usize| {
             let (options, camera, tilt) = (&self.options, self.camera(), self.tilt);
-            let (scale_sd, height_m) = (self.scale_sd(), options.height_of(person));
+            let (scale_sd, height_m) = (self.scale_sd(), self.given_height(person));
             candidate.begin(&Given { options, camera, tilt, scale_sd, height_m, size })
         };
         let is_back = |person: usize| begin(person).ok().filter(|active| self.is_back(person, active));

@@ -75,7 +75,7 @@ impl Tracker {
         if feet_cut_off(&sightings, size[1] as usize) || standing.lasts_s() < SHORTEST_S {
             return Err(standing);
         }
-        let next_m = options.height_of(self.identities.count());
+        let next_m = self.given_height(self.identities.count());
         let height = approaching_height(options, next_m, camera, &sightings);
         match options.walker(height.height_m, COMFORTABLE_MPS) {
             Ok(walker) => Approach { camera, height, walker, options }.begin(standing),
@@ -89,7 +89,7 @@ impl Tracker {
             return None;
         }
         let (options, camera) = (&self.options, self.options.camera.as_ref());
-        let height_m = options.height_of(person);
+        let height_m = self.given_height(person);
         let height = start_height(options, height_m, camera, sightings);
         let walker = options.walker(height.height_m, COMFORTABLE_MPS).ok()?;
         let given = Given { options, camera, tilt: self.tilt, scale_sd: 0.0, height_m, size };

@@ -621,6 +621,24 @@ fn heights_are_those_of_people_in_order_of_appearance() {
     assert!(matches!(refused, TrackError::Body(_)) && refused.to_string().contains("18"), "{refused}");
 }
 
+/// Somebody 1.75 m tall is seen.
+#[test]
+fn of_the_given_heights_a_person_has_the_one_that_a_given_camera_shows_clearly() {
+    let heights = |given_m: [f64; 3], camera: Option<Camera>| {
+        let further_heights_m = given_m[1..].to_vec();
+        let options = TrackerOptions { camera, further_heights_m, ..TrackerOptions::for_height(given_m[0]) };
+        let mut tracker = Tracker::new(options).unwrap();
+        tracker.order_heights(&Candidate { seen: seen_walking(1.3), ..Candidate::default() });
+        [0, 1, 2].map(|person| tracker.given_height(person).unwrap())
+    };
+    assert_eq!(heights([1.5, 1.95, 1.75], Some(camera())), [1.75, 1.5, 1.95]);
+    assert_eq!(heights([1.5, 1.75, 1.95], Some(camera())), [1.75, 1.5, 1.95]);
+    for given_m in [[1.74, 1.76, 1.95], [1.75, 1.5, 1.95]] {
+        assert_eq!(heights(given_m, Some(camera())), given_m, "in order of appearance");
+    }
+    assert_eq!(heights([1.5, 1.95, 1.75], None), [1.5, 1.95, 1.75], "no camera shows it");
+}
+
 /// Two given heights, and the frames of somebody who walks.
 fn sought_with_heights() -> Tracker {
     let options = TrackerOptions { start_frames: 5, further_heights_m: vec![1.6], ..options() };
