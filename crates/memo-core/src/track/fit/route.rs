@@ -9,8 +9,8 @@
 //! at the length s of L, with the Legendre polynomials P_j, and turned there by a'(s):
 //!
 //! 1. Before the fit, with body and curves held, two steps solve for the c_j that bring the contours to the edges.
-//! 2. Then the c_j are unknowns of the fit, beside body and curves. A nearer and a taller person have nearly the same
-//!    contours, so while one of the two is held, the other hardly moves.
+//! 2. Then the c_j are unknowns of the fit, beside body and curves. A person who is nearer and smaller has nearly
+//!    the same contours, so while the distance is held, the body is fitted to it.
 //!
 //! Solved for from the first step on, with edges searched far, the ends of a route ran off the person in 5 of 12 drawn walks.
 
