@@ -158,7 +158,9 @@ impl PyExplainer {
             let message = format!("{:?} lies outside frames of {width}x{height} pixels", look.window);
             return Err(refused("window_px", &message));
         }
-        let around = self.walks.iter().enumerate().filter(|(k, _)| *k != index);
+        // The tracker takes two who start at once for alone until then, however near they are.
+        let is_alone = self.walks[index].is_alone(evidence.frame);
+        let around = self.walks.iter().enumerate().filter(|(k, _)| *k != index && !is_alone);
         let bodies = around.filter_map(|(_, walk)| walk.drawn(evidence.frame));
         let cylinders: Vec<EllipticCylinder> = bodies.flat_map(|body| body.cylinders).collect();
         let others = Others::new(&cylinders, self.walks[index].camera.position());

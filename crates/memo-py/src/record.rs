@@ -18,7 +18,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::borrow::Cow;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 /// Segments (n, 2, 2) and the body part of each (n,).
 pub type SegmentsWithParts<'py> = (Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArray1<u8>>);
@@ -241,6 +241,8 @@ pub struct Recorded {
     frames: Vec<usize>,
     looks: HashMap<usize, Look>,
     drawn: HashMap<usize, PosedBody>,
+    /// Frames in which nobody else was near, to the tracker.
+    alone: HashSet<usize>,
     /// Rotation vectors of the camera by frame; empty if it stood still.
     turns: HashMap<usize, DVec3>,
 }
@@ -264,6 +266,7 @@ impl Recorded {
             drawn.pose(torso, found.drawn_heading_rad[k], &posture)
         };
         let turns = found.camera_turn_rad.iter().flatten().map(|turn| DVec3::from_array(*turn));
+        let shared = found.shared.iter().flatten().copied();
         let frames = || found.frame.iter().copied();
         Ok(Self {
             camera: PyCamera::from_parameters(&found.camera)?.0,
@@ -274,6 +277,7 @@ impl Recorded {
             },
             looks: frames().enumerate().map(|(k, frame)| (frame, found.look(k))).collect(),
             drawn: frames().enumerate().map(|(k, frame)| (frame, posed(k))).collect(),
+            alone: frames().zip(shared).filter(|(_, shared)| !shared).map(|(frame, _)| frame).collect(),
             turns: frames().zip(turns).collect(),
             frames: found.frame,
         })
@@ -292,6 +296,11 @@ impl Recorded {
     /// The body that is drawn in a frame.
     pub fn drawn(&self, frame: usize) -> Option<&PosedBody> {
         self.drawn.get(&frame)
+    }
+
+    /// True if nobody else was near in a frame, to the tracker: then nobody hid the person.
+    pub fn is_alone(&self, frame: usize) -> bool {
+        self.alone.contains(&frame)
     }
 
     pub fn scene(&self, look: &Look) -> Scene<'_> {
