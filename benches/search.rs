@@ -42,14 +42,14 @@ fn grid_search(c: &mut Criterion) {
     group.sample_size(30);
     let tracking = Grid::printed(&truth);
     let whole_cycle = Grid::whole_cycle(truth.along_m, truth.height_m);
-    let (per_column, per_hypothesis) = (HiddenLines::PerColumn, HiddenLines::PerHypothesis);
+    let (per_tile, per_hypothesis) = (HiddenLines::PerTile, HiddenLines::PerHypothesis);
     type Search = fn(&[EdgeLine], &Scene<'_>, &Grid, &SimilarityOptions, HiddenLines) -> SearchResult;
     let searches: [(&str, Search, Grid, HiddenLines); 5] = [
-        ("tracking, hidden lines per column", search, tracking, per_column),
+        ("tracking, hidden lines per tile", search, tracking, per_tile),
         ("tracking, hidden lines per hypothesis", search, tracking, per_hypothesis),
-        ("tracking, highest point", search_peak, tracking, per_column),
-        ("whole cycle, hidden lines per column", search, whole_cycle, per_column),
-        ("whole cycle, highest point of each phase", search_each_phase, whole_cycle, per_column),
+        ("tracking, highest point", search_peak, tracking, per_tile),
+        ("whole cycle, hidden lines per tile", search, whole_cycle, per_tile),
+        ("whole cycle, highest point of each phase", search_each_phase, whole_cycle, per_tile),
     ];
     for (name, search, grid, hidden_lines) in searches {
         group.throughput(Throughput::Elements(grid.len() as u64));

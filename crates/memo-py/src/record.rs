@@ -53,6 +53,11 @@ pub struct WalkRecord<'py> {
     curves_rad: [Vec<f64>; 4],
     frame: Vec<usize>,
     window_px: Vec<[usize; 4]>,
+    /// The grid of positions along the path; without it, hidden lines are those at the best position.
+    #[pyo3(default)]
+    middle_along_m: Option<Vec<f64>>,
+    #[pyo3(default)]
+    alongs: Option<Vec<usize>>,
     /// The grid of heights of the torso.
     middle_height_m: Vec<f64>,
     heights: Vec<usize>,
@@ -98,6 +103,8 @@ impl<'py> WalkRecord<'py> {
                 let Rectangle { left, top, right, bottom } = s.look.window;
                 [left, top, right, bottom]
             }),
+            middle_along_m: Some(each(steps, |s| s.look.alongs.centre)),
+            alongs: Some(each(steps, |s| s.look.alongs.count)),
             middle_height_m: each(steps, |s| s.look.heights.centre),
             heights: each(steps, |s| s.look.heights.count),
             along_m: each(steps, |s| s.look.best.along_m),
@@ -130,6 +137,8 @@ impl<'py> WalkRecord<'py> {
         let frames = self.frame.len();
         let lengths = [
             ("window_px", Some(self.window_px.len())),
+            ("middle_along_m", self.middle_along_m.as_ref().map(Vec::len)),
+            ("alongs", self.alongs.as_ref().map(Vec::len)),
             ("middle_height_m", Some(self.middle_height_m.len())),
             ("heights", Some(self.heights.len())),
             ("along_m", Some(self.along_m.len())),
@@ -151,6 +160,9 @@ impl<'py> WalkRecord<'py> {
         if self.searched_origin_m.is_some() != self.searched_heading_rad.is_some() {
             return Err(refused("searched_heading_rad", "is missing, or searched_origin_m is"));
         }
+        if self.middle_along_m.is_some() != self.alongs.is_some() {
+            return Err(refused("alongs", "is missing, or middle_along_m is"));
+        }
         let curves_fit = |c: &Vec<f64>| (3..=MOST_SAMPLES).contains(&c.len());
         if !self.curves_rad.iter().all(curves_fit) {
             return Err(refused(
@@ -169,14 +181,18 @@ impl<'py> WalkRecord<'py> {
                 return Err(refused("window_px", &format!("{window:?} is no rectangle")));
             }
         }
-        match self.heights.iter().find(|count| !(1..=MOST_HEIGHTS).contains(*count)) {
-            Some(count) => Err(refused("heights", &format!("must be 1 to {MOST_HEIGHTS}, got {count}"))),
-            None => Ok(()),
+        for (name, counts) in [("heights", Some(&self.heights)), ("alongs", self.alongs.as_ref())] {
+            if let Some(count) =
+                counts.into_iter().flatten().find(|count| !(1..=MOST_VALUES).contains(*count))
+            {
+                return Err(refused(name, &format!("must be 1 to {MOST_VALUES}, got {count}")));
+            }
         }
+        Ok(())
     }
 
     /// All numbers that must be finite.
-    fn numbers(&self) -> [(&'static str, Numbers<'_>); 16] {
+    fn numbers(&self) -> [(&'static str, Numbers<'_>); 17] {
         fn flat<const N: usize>(rows: &[[f64; N]]) -> Numbers<'_> {
             Box::new(rows.iter().flatten().copied())
         }
@@ -189,6 +205,7 @@ impl<'py> WalkRecord<'py> {
             ("height_m", list(std::slice::from_ref(&self.height_m))),
             ("proportions", list(&self.proportions)),
             ("curves_rad", Box::new(self.curves_rad.iter().flatten().copied())),
+            ("middle_along_m", list(self.middle_along_m.as_deref().unwrap_or_default())),
             ("middle_height_m", list(&self.middle_height_m)),
             ("along_m", list(&self.along_m)),
             ("height_of_torso_m", list(&self.height_of_torso_m)),
@@ -210,8 +227,13 @@ impl<'py> WalkRecord<'py> {
             (Some(origins), Some(headings_rad)) => (origins[k], headings_rad[k]),
             _ => (self.origin_m, self.heading_rad),
         };
+        let (centre, count) = match (&self.middle_along_m, &self.alongs) {
+            (Some(middles_m), Some(counts)) => (middles_m[k], counts[k]),
+            _ => (self.along_m[k], 1),
+        };
         Look {
             window: Rectangle { left, top, right, bottom },
+            alongs: Axis { centre, step: POSITION_STEP_M, count },
             heights: Axis { centre: self.middle_height_m[k], step: POSITION_STEP_M, count: self.heights[k] },
             best: Hypothesis {
                 along_m: self.along_m[k],
@@ -229,8 +251,8 @@ fn each<T, U>(items: &[T], value: impl Fn(&T) -> U) -> Vec<U> {
     items.iter().map(value).collect()
 }
 
-/// Maximum number of heights of a grid; the tracker's own has eleven.
-const MOST_HEIGHTS: usize = 1000;
+/// Maximum number of positions or heights of a grid; the tracker's own has at most 21.
+const MOST_VALUES: usize = 1000;
 /// Maximum number of samples of a curve; memo's own have fifty.
 const MOST_SAMPLES: usize = 10_000;
 

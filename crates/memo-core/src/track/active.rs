@@ -517,8 +517,8 @@ pub(super) mod tests {
             height: ConstantVelocity::new(1.15, 0.0, 1e-4, 0.0),
             phase: ConstantVelocity::new(cycles, 0.9, 1e-4, 1e-3),
         };
-        let heights = Axis::around(1.15, 0.1, 0.02);
-        let look = Look { window: WINDOW, heights, best: state.hypothesis(), path: PATH };
+        let (alongs, heights) = (Axis::around(along_m, 0.1, 0.02), Axis::around(1.15, 0.1, 0.02));
+        let look = Look { window: WINDOW, alongs, heights, best: state.hypothesis(), path: PATH };
         let (time_s, measured) = (FRAME_S * frame as f64, Some(state.hypothesis()));
         Step { frame, time_s, state, measured, similarity, visible: 1.0, shared: false, by_feet: false, look }
     }

@@ -11,7 +11,7 @@
 
 use super::evidence::{Evidence, EvidenceError, EvidenceOptions, WindowEdges};
 use super::score::{ModelLine, Similarity, similarity};
-use super::search::{Axis, Grid, Hypothesis, Scene, search};
+use super::search::{Axis, Grid, Hypothesis, Scene, search_at};
 use super::walk::{Look, WalkOptions};
 
 /// Number of phases of [`Explanation::cycle`]: twice as many as the search grid has in a cycle.
@@ -57,36 +57,30 @@ pub fn explain(
     // 1. The edges of the window.
     let edges = evidence.edges(&look.window, Some(scene.camera), evidence_options)?;
     // 2. The model's contours, each with the edge it matches.
-    let lines = scene.searched_lines(&look.best, look.heights.centre, options.hidden_lines);
+    let grid = cycle_at(look);
+    let lines = scene.searched_lines(&look.best, &grid, options.hidden_lines);
     let similarity = similarity(&lines, &edges.lines, &options.similarity);
     // 3. The similarity at all phases.
-    let grid = cycle_at(look);
-    let found = search(&edges.lines, scene, &grid, &options.similarity, options.hidden_lines);
-    let row = nearest(&look.heights, look.best.height_m);
-    let scores = found.scores.chunks_exact(grid.height.count).map(|heights| heights[row]);
-    let score = |(index, similarity): (usize, f32)| PhaseScore {
-        phase: grid.phase.at(index).rem_euclid(1.0),
-        similarity,
+    let along = grid.along.nearest(look.best.along_m);
+    let height = grid.height.nearest(look.best.height_m);
+    let found = search_at(&edges.lines, scene, &grid, along, &options.similarity, options.hidden_lines);
+    let score = |p: usize| PhaseScore {
+        phase: grid.phase.at(p).rem_euclid(1.0),
+        similarity: found.scores[grid.index(p, along, height)],
     };
-    let mut cycle: Vec<PhaseScore> = scores.enumerate().map(score).collect();
+    let mut cycle: Vec<PhaseScore> = (0..grid.phase.count).map(score).collect();
     cycle.sort_by(|a, b| a.phase.total_cmp(&b.phase));
     Ok(Explanation { edges, lines, similarity, cycle, chosen: look.best })
 }
 
-/// All phases at the chosen position. The chosen phase is among them, and the heights are those of the search.
+/// All phases at the positions and heights of the search. The chosen phase is among them.
 fn cycle_at(look: &Look) -> Grid {
     let step = 1.0 / CYCLE_PHASES as f64;
     Grid {
-        along: Axis { centre: look.best.along_m, step: 0.0, count: 1 },
+        along: look.alongs,
         height: look.heights,
         phase: Axis { centre: look.best.phase - 0.5 * step, step, count: CYCLE_PHASES },
     }
-}
-
-/// Index of the value nearest to a given one.
-fn nearest(axis: &Axis, value: f64) -> usize {
-    let off = |index: &usize| (axis.at(*index) - value).abs();
-    (0..axis.count).min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(0)
 }
 
 #[cfg(test)]

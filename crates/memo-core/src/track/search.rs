@@ -2,16 +2,17 @@
 //!
 //! Hidden-line removal leaves no analytical relation between parameters and similarity, so the points of an
 //! equally spaced grid are scored and the best one taken: all of them ([`search`]), or those that lead to the highest
-//! ([`search_peak`], [`search_each_phase`]). Columns of the grid (one phase, one position along the
-//! path) are independent and run in parallel. Each score depends only on its own hypothesis, so the result does
-//! not depend on the number of threads.
+//! ([`search_peak`], [`search_each_phase`]). Tiles of the grid (one phase, some positions along the
+//! path) are independent and run in parallel. Each score depends only on its own hypothesis and grid, so the result
+//! does not depend on the number of threads.
 
-use super::column::{ColumnScorer, LANES, Lanes, LineLanes, Projection};
+use super::lanes::{LANES, LaneScorer, Lanes, LineLanes, Projection};
 use super::score::{EdgeLine, ModelLine, SimilarityOptions};
 use crate::model::visibility::{Others, PreparedView, VisibilityOptions, VisibleSegment};
 use crate::model::{Camera, PosedBody, Walker};
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// The straight line on the ground along which a person walks.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -124,21 +125,26 @@ impl<'a> Scene<'a> {
         visible.iter().filter_map(|segment| project(segment, self.camera)).collect()
     }
 
-    /// The side lines that [`search`] compares at a hypothesis, in ideal pixels, clipped to the image: the lines
-    /// visible at the middle height of the grid's column, raised to the height of the hypothesis.
+    /// The side lines that [`search`] compares at a hypothesis of a grid, in ideal pixels, clipped to the image: the
+    /// lines visible in the middle of its tile, moved to the hypothesis.
     pub fn searched_lines(
         &self,
         hypothesis: &Hypothesis,
-        middle_height_m: f64,
+        grid: &Grid,
         hidden_lines: HiddenLines,
     ) -> Vec<ModelLine> {
         if hidden_lines == HiddenLines::PerHypothesis {
             return self.lines(hypothesis);
         }
-        let visible = self.visible(&Hypothesis { height_m: middle_height_m, ..*hypothesis }, &LINES_ONLY);
-        let raised = DVec3::Z * (hypothesis.height_m - middle_height_m);
-        let moved =
-            |s: &VisibleSegment| VisibleSegment { start: s.start + raised, end: s.end + raised, ..*s };
+        let tile = grid.tile_of(grid.along.nearest(hypothesis.along_m));
+        let middle = Hypothesis { phase: hypothesis.phase, ..grid.middle(&tile) };
+        let visible = self.visible(&middle, &LINES_ONLY);
+        let [from, to] = [&middle, hypothesis].map(|h| self.path.point(h.along_m, h.height_m));
+        let moved = |s: &VisibleSegment| VisibleSegment {
+            start: s.start + (to - from),
+            end: s.end + (to - from),
+            ..*s
+        };
         visible.iter().filter_map(|segment| project(&moved(segment), self.camera)).collect()
     }
 }
@@ -165,6 +171,12 @@ impl Axis {
     /// The `index`-th value.
     pub fn at(&self, index: usize) -> f64 {
         self.centre + (index as f64 - 0.5 * (self.count as f64 - 1.0)) * self.step
+    }
+
+    /// Index of the value nearest to a given one, the first if two are as near.
+    pub(super) fn nearest(&self, value: f64) -> usize {
+        let off = |index: &usize| (self.at(*index) - value).abs();
+        (0..self.count).min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(0)
     }
 
     /// The value at the vertex of the parabola through a score and its two neighbours. At either end, where a
@@ -195,6 +207,8 @@ pub struct Grid {
 pub const POSITION_STEP_M: f64 = 0.02;
 /// The paper's step in phase, cycles.
 pub const PHASE_STEP: f64 = 0.02;
+/// Length of a tile along the path, metres: hidden lines are those of its middle ([`HiddenLines::PerTile`]).
+const TILE_M: f64 = 0.16;
 
 impl Grid {
     /// The paper's tracking grid around a prediction: 2dX = 40 cm, 2dY = 20 cm, 2dpose = 0.4, steps 2 cm, 2
@@ -247,19 +261,37 @@ impl Grid {
         (column / self.along.count, column % self.along.count, index % self.height.count)
     }
 
-    fn index(&self, phase: usize, along: usize, height: usize) -> usize {
+    pub(super) fn index(&self, phase: usize, along: usize, height: usize) -> usize {
         (phase * self.along.count + along) * self.height.count + height
+    }
+
+    /// Number of positions along the path in a tile.
+    fn tile_width(&self) -> usize {
+        let most = (TILE_M / self.along.step.abs()).round() as usize;
+        most.clamp(1, self.along.count.max(1))
+    }
+
+    /// The positions along the path, by index, whose tile holds this one.
+    fn tile_of(&self, along: usize) -> Range<usize> {
+        let first = along - along % self.tile_width();
+        first..(first + self.tile_width()).min(self.along.count)
+    }
+
+    /// The middle of a tile, at phase 0.
+    fn middle(&self, tile: &Range<usize>) -> Hypothesis {
+        let along_m = self.along.at(tile.start) + 0.5 * (tile.len() as f64 - 1.0) * self.along.step;
+        Hypothesis { along_m, height_m: self.height.centre, phase: 0.0 }
     }
 }
 
 /// How often hidden lines are removed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum HiddenLines {
-    /// Once for each phase and position along the path, at the middle height; the visible pieces are then moved
-    /// up and down. At a distance of 6 m the view turns by less than 1 degree over the 20 cm of heights, and the
-    /// score changes by less than 1 %.
+    /// Once for each phase and tile of positions, 16 cm along the path and all heights, in its middle; the visible
+    /// pieces are then moved along, up and down. At a distance of 6 m the view turns by less than 1 degree to either
+    /// side, and the score changes by less than 1 %.
     #[default]
-    PerColumn,
+    PerTile,
     /// For each hypothesis.
     PerHypothesis,
 }
@@ -369,18 +401,31 @@ pub fn search_each_phase(
     })
 }
 
+/// The scores of [`search`] at one position along the path; the others are minus infinity.
+pub(super) fn search_at(
+    edges: &[EdgeLine],
+    scene: &Scene<'_>,
+    grid: &Grid,
+    along: usize,
+    options: &SimilarityOptions,
+    hidden_lines: HiddenLines,
+) -> SearchResult {
+    let columns = Columns::new(edges, scene, grid, options, hidden_lines);
+    columns.climbed((0..grid.phase.count).map(|p| p * grid.along.count + along).collect(), |_| Vec::new())
+}
+
 /// So many columns are climbed from: similarity has several peaks, where a leg fits the other leg's edges.
 const PEAKS: usize = 4;
 const PEAKS_OF_PHASE: usize = 2;
 
 /// An index and those beside it.
-fn beside(index: usize, count: usize) -> std::ops::Range<usize> {
+fn beside(index: usize, count: usize) -> Range<usize> {
     index.saturating_sub(1)..(index + 2).min(count)
 }
 
 /// The columns of a grid (one phase, one position along the path), of which some are scored.
 struct Columns<'a> {
-    scorer: ColumnScorer<'a>,
+    scorer: LaneScorer<'a>,
     scene: &'a Scene<'a>,
     grid: Grid,
     hidden_lines: HiddenLines,
@@ -398,7 +443,7 @@ impl<'a> Columns<'a> {
         options: &'a SimilarityOptions,
         hidden_lines: HiddenLines,
     ) -> Self {
-        let scorer = ColumnScorer::new(edges, options);
+        let scorer = LaneScorer::new(edges, options);
         let origin = Hypothesis { along_m: 0.0, height_m: 0.0, phase: 0.0 };
         let pose = |p: usize| scene.pose(&Hypothesis { phase: grid.phase.at(p), ..origin });
         let bodies = (0..grid.phase.count).map(pose).collect();
@@ -416,7 +461,7 @@ impl<'a> Columns<'a> {
     }
 
     /// The columns with the highest scores, the first of equals first.
-    fn highest(&self, among: std::ops::Range<usize>, count: usize) -> impl Iterator<Item = usize> + use<> {
+    fn highest(&self, among: Range<usize>, count: usize) -> impl Iterator<Item = usize> + use<> {
         let most = |column: usize| self.heights(column).iter().copied().fold(f32::NEG_INFINITY, f32::max);
         let mut columns: Vec<(usize, f32)> = among.map(|column| (column, most(column))).collect();
         columns.sort_by(|a, b| b.1.total_cmp(&a.1));
@@ -439,27 +484,59 @@ impl<'a> Columns<'a> {
     /// Scores some columns, in ascending order, in parallel.
     fn score(&mut self, columns: &[usize]) {
         let mut scores = std::mem::take(&mut self.scores);
-        let all = scores.chunks_exact_mut(self.grid.height.count).enumerate();
-        let wanted: Vec<(usize, &mut [f32])> =
-            all.filter(|(column, _)| columns.binary_search(column).is_ok()).collect();
-        let score_column = |work: &mut Column, (column, out)| self.score_column(work, column, out);
-        wanted.into_par_iter().for_each_init(Column::default, score_column);
+        let (alongs, heights) = (self.grid.along.count, self.grid.height.count);
+        // 1. The columns of each tile of each phase, with the place of the tile's scores.
+        let mut tiles = Vec::new();
+        let mut left = columns;
+        for (phase, scores) in scores.chunks_exact_mut(alongs * heights).enumerate() {
+            for (t, scores) in scores.chunks_mut(self.grid.tile_width() * heights).enumerate() {
+                let first = t * self.grid.tile_width();
+                let end = phase * alongs + first + scores.len() / heights;
+                let (of_tile, others) = left.split_at(left.partition_point(|&column| column < end));
+                left = others;
+                if !of_tile.is_empty() {
+                    let of_tile = of_tile.iter().map(|column| column % alongs).collect();
+                    tiles.push((Tile { phase, first, alongs: of_tile }, scores));
+                }
+            }
+        }
+        // 2. Their scores.
+        tiles
+            .into_par_iter()
+            .for_each_init(Work::default, |work, (tile, out)| self.score_tile(work, &tile, out));
         self.scores = scores;
     }
 
-    fn score_column(&self, work: &mut Column, index: usize, out: &mut [f32]) {
-        let Grid { along, height, .. } = &self.grid;
-        let (body, along_m) = (&self.bodies[index / along.count], along.at(index % along.count));
+    /// Scores the columns of a tile; `out` has the scores of all its positions.
+    fn score_tile(&self, work: &mut Work, tile: &Tile, out: &mut [f32]) {
+        let heights = self.grid.height.count;
+        let points = tile.alongs.iter().flat_map(|&along| (0..heights).map(move |height| [along, height]));
+        let mut put =
+            |[along, height]: [usize; 2], score: f32| out[(along - tile.first) * heights + height] = score;
+        let body = &self.bodies[tile.phase];
         match self.hidden_lines {
-            HiddenLines::PerColumn => work.score(&self.scorer, self.scene, body, along_m, height, out),
+            HiddenLines::PerTile => {
+                let middle = self.grid.middle(&self.grid.tile_of(tile.first));
+                work.score(self, body, &middle, points, &mut put);
+            }
             HiddenLines::PerHypothesis => {
-                for (h, score) in out.iter_mut().enumerate() {
-                    let here = Axis { centre: height.at(h), step: height.step, count: 1 };
-                    work.score(&self.scorer, self.scene, body, along_m, &here, std::slice::from_mut(score));
+                for [along, height] in points {
+                    let (along_m, height_m) = (self.grid.along.at(along), self.grid.height.at(height));
+                    let here = Hypothesis { along_m, height_m, phase: 0.0 };
+                    work.score(self, body, &here, std::iter::once([along, height]), &mut put);
                 }
             }
         }
     }
+}
+
+/// Neighbouring positions along the path at one phase.
+struct Tile {
+    phase: usize,
+    /// Its first position along the path.
+    first: usize,
+    /// The positions that are scored, in ascending order.
+    alongs: Vec<usize>,
 }
 
 /// Index of the largest value, the first if several are equal.
@@ -467,63 +544,70 @@ fn arg_max(values: &[f32]) -> usize {
     values.iter().enumerate().fold(0, |best, (i, v)| if *v > values[best] { i } else { best })
 }
 
-/// Working memory for one column of the grid.
+/// Working memory of a thread.
 #[derive(Default)]
-struct Column {
+struct Work {
     view: PreparedView,
     visible: Vec<VisibleSegment>,
     near: Vec<u32>,
+    points: Vec<[usize; 2]>,
 }
 
-impl Column {
-    /// Scores all heights at one position along the path, for a body posed at the path's origin.
+impl Work {
+    /// Scores points of the grid (indices along the path and in height), for a body posed at the path's origin whose
+    /// hidden lines are those at `middle`.
     fn score(
         &mut self,
-        scorer: &ColumnScorer<'_>,
-        scene: &Scene<'_>,
+        columns: &Columns<'_>,
         body: &PosedBody,
-        along_m: f64,
-        heights: &Axis,
-        out: &mut [f32],
+        middle: &Hypothesis,
+        points: impl Iterator<Item = [usize; 2]>,
+        put: &mut impl FnMut([usize; 2], f32),
     ) {
-        // 1. The visible contours of the body at the middle height of the column. Moving the body is the same as
-        //    moving the camera the other way.
-        let place = scene.path.point(along_m, heights.centre) - scene.path.point(0.0, 0.0);
+        let Columns { scorer, scene, grid, .. } = columns;
+        // 1. The visible contours of the body in the middle. Moving the body is the same as moving the camera the other
+        //    way.
+        let place = scene.path.point(middle.along_m, middle.height_m) - scene.path.point(0.0, 0.0);
         let seen_from = scene.camera.position() - place;
         let (view, visible) = (&mut self.view, &mut self.visible);
         view.visible_contours_among(&body.cylinders, scene.others, seen_from, &LINES_ONLY, visible);
-        // 2. The visible pieces raised to each height, and the edges that can match them there.
-        let projection = Projection::new(scene.camera, place);
-        for (block, scores) in out.chunks_mut(LANES).enumerate() {
-            let height = |i: usize| heights.at((block * LANES + i).min(heights.count - 1));
-            let raised_m = std::array::from_fn(|i| (height(i) - heights.centre) as f32);
+        // 2. The visible pieces moved to each point, and the edges that can match them there.
+        let projection = Projection::new(scene.camera, place, scene.path.direction());
+        self.points.clear();
+        self.points.extend(points);
+        for points in self.points.chunks(LANES) {
+            let point = |i: usize| points[i.min(points.len() - 1)];
+            let ahead_m = |i: usize| (grid.along.at(point(i)[0]) - middle.along_m) as f32;
+            let raised_m = |i: usize| (grid.height.at(point(i)[1]) - middle.height_m) as f32;
+            let moved_m = [std::array::from_fn(ahead_m), std::array::from_fn(raised_m)];
             let (visible, near) = (&self.visible, &mut self.near);
-            let raised = Raised { scorer, projection: &projection, visible, raised_m, near };
-            let all = pulp::Arch::new().dispatch(raised);
-            scores.copy_from_slice(&all[..scores.len()]);
+            let moved = Moved { scorer, projection: &projection, visible, moved_m, near };
+            let scores = pulp::Arch::new().dispatch(moved);
+            points.iter().zip(scores).for_each(|(point, score)| put(*point, score));
         }
     }
 }
 
-/// The visible pieces of one body at several heights. It is a type and not a closure, because the compiler may
+/// The visible pieces of one body at several points of the grid. It is a type and not a closure, because the compiler may
 /// call a closure that borrows mutably through a function without the dispatched instruction set.
-struct Raised<'a> {
-    scorer: &'a ColumnScorer<'a>,
+struct Moved<'a> {
+    scorer: &'a LaneScorer<'a>,
     projection: &'a Projection<'a>,
     visible: &'a [VisibleSegment],
-    raised_m: Lanes,
+    /// How far the pieces are moved ahead and up.
+    moved_m: [Lanes; 2],
     near: &'a mut Vec<u32>,
 }
 
-impl pulp::WithSimd for Raised<'_> {
+impl pulp::WithSimd for Moved<'_> {
     type Output = Lanes;
 
-    /// Eq. (11): s(p) = sum of w_K s_i over sum of l_M, at each height.
+    /// Eq. (11): s(p) = sum of w_K s_i over sum of l_M, at each point.
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) -> Lanes {
         let (mut answered, mut model_px) = ([0.0f32; LANES], [0.0f32; LANES]);
         for piece in self.visible {
-            let lines = LineLanes::new(self.projection, piece.start, piece.end, &self.raised_m);
+            let lines = LineLanes::new(self.projection, piece.start, piece.end, &self.moved_m);
             self.scorer.near(&lines, self.near);
             let best = self.scorer.best(piece.part, &lines, self.near);
             for i in 0..LANES {

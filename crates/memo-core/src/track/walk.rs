@@ -122,7 +122,9 @@ impl State {
 pub struct Look {
     /// The part of the image from which edges were taken.
     pub window: Rectangle,
-    /// The heights of the search grid; hidden lines were removed at the middle height.
+    /// The positions along the path of the search grid.
+    pub alongs: Axis,
+    /// Its heights.
     pub heights: Axis,
     /// The grid point of the highest similarity; the prediction if nothing matched.
     pub best: Hypothesis,
@@ -360,7 +362,8 @@ fn match_frame(edges: &FrameEdges, scene: &Scene<'_>, predicted: &State, options
     let filter = options.filter.of_visible_share(trusted.into());
     let state = measured.map_or(*predicted, |measured| predicted.update(&measured, &filter));
     let best = measured.map_or(predicted.hypothesis(), |_| found.best());
-    let look = Look { window: edges.window, heights: grid.height, best, path: scene.path };
+    let look =
+        Look { window: edges.window, alongs: grid.along, heights: grid.height, best, path: scene.path };
     Step {
         frame: edges.frame,
         time_s: edges.time_s,
@@ -458,7 +461,9 @@ mod tests {
             height: ConstantVelocity::new(measured.height_m, 0.0, 1e-4, 0.0),
             phase: ConstantVelocity::new(measured.phase, 0.9, 0.01, 0.01),
         };
-        let look = Look { window: WINDOW, heights: Axis::around(1.0, 0.1, 0.02), best: measured, path: PATH };
+        let alongs = Axis::around(measured.along_m, 0.1, 0.02);
+        let heights = Axis::around(1.0, 0.1, 0.02);
+        let look = Look { window: WINDOW, alongs, heights, best: measured, path: PATH };
         Step {
             frame: 0,
             time_s,

@@ -92,7 +92,8 @@ fn tracked(measured: &[Measured], path: Path, direction: Direction) -> TrackedWa
         state.phase = state.phase.update(phase, &options.filter.phase);
         let hypothesis = Hypothesis { along_m, height_m: 1.15, phase: phase.rem_euclid(1.0) };
         let window = Rectangle { left: 0, top: 0, right: 9, bottom: 9 };
-        let look = Look { window, heights: Axis::around(1.15, 0.1, 0.02), best: hypothesis, path };
+        let alongs = Axis::around(hypothesis.along_m, 0.1, 0.02);
+        let look = Look { window, alongs, heights: Axis::around(1.15, 0.1, 0.02), best: hypothesis, path };
         Step {
             frame,
             time_s,

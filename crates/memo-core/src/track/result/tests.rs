@@ -39,6 +39,7 @@ fn followed(path: Path, frames: &[(f64, Option<Hypothesis>)], options: WalkOptio
         let measured = seen.map(|h| Hypothesis { phase: h.phase.rem_euclid(1.0), ..h });
         let look = Look {
             window: Rectangle { left: 0, top: 0, right: 9, bottom: 9 },
+            alongs: Axis::around(state.along.position, 0.1, 0.02),
             heights: Axis::around(1.0, 0.1, 0.02),
             best: state.hypothesis(),
             path,

@@ -152,24 +152,24 @@ fn a_pose_leads_back_to_its_hypothesis() {
     assert!((path.along(across) - 0.6).abs() < 1e-12);
 }
 
-/// More heights than one block has lanes.
+/// More points than one block has lanes, in several tiles, the last of which is shorter.
 #[test]
-fn every_height_of_a_high_column_is_compared_as_its_searched_lines() {
+fn every_point_is_compared_as_its_searched_lines() {
     let (walker, camera) = (walker(), camera());
     let path = Path { origin: DVec2::new(0.1, 0.2), heading_rad: 0.2 };
     let scene = Scene::new(&walker, &camera, &path);
     let truth = Hypothesis { along_m: 0.1, height_m: walker.level_torso_height_m(), phase: 0.41 };
     let edges = edges_of(&scene, &truth);
-    let one = |centre: f64| Axis { centre, step: 0.02, count: 1 };
+    let phase = Axis { centre: 0.43, step: 0.02, count: 1 };
     let height = Axis::around(truth.height_m - 0.03, 0.2, 0.01);
-    let grid = Grid { along: one(0.1), height, phase: one(0.43) };
+    let grid = Grid { along: Axis::around(0.12, 0.18, 0.02), height, phase };
     let options = SimilarityOptions::default();
-    let found = search(&edges, &scene, &grid, &options, HiddenLines::PerColumn);
-    assert_eq!(found.scores.len(), 41);
+    let found = search(&edges, &scene, &grid, &options, HiddenLines::PerTile);
+    assert_eq!(found.scores.len(), 19 * 41);
     for (index, score) in found.scores.iter().enumerate() {
-        let lines = scene.searched_lines(&grid.hypothesis(index), height.centre, HiddenLines::PerColumn);
+        let lines = scene.searched_lines(&grid.hypothesis(index), &grid, HiddenLines::PerTile);
         let plain = similarity(&lines, &edges, &options).value;
-        assert!((plain - score).abs() < 1e-4, "height {index}: {plain} against {score}");
+        assert!((plain - score).abs() < 1e-4, "point {index}: {plain} against {score}");
     }
     assert!((found.best().height_m - truth.height_m).abs() < 0.011);
 }
@@ -203,7 +203,7 @@ fn a_planted_walker_is_found_in_both_directions() {
 }
 
 #[test]
-fn sharing_visibility_along_a_column_changes_little_and_threads_change_nothing() {
+fn sharing_visibility_in_a_tile_changes_little_and_threads_change_nothing() {
     let (walker, camera) = (walker(), camera());
     let path = Path { origin: DVec2::new(0.2, 0.1), heading_rad: 0.3 };
     let scene = Scene::new(&walker, &camera, &path);
@@ -211,14 +211,14 @@ fn sharing_visibility_along_a_column_changes_little_and_threads_change_nothing()
     let edges = edges_of(&scene, &Hypothesis { phase: 0.45, ..truth });
     let grid = Grid::printed(&truth);
     let options = SimilarityOptions::default();
-    let shared = search(&edges, &scene, &grid, &options, HiddenLines::PerColumn);
+    let shared = search(&edges, &scene, &grid, &options, HiddenLines::PerTile);
     let exact = search(&edges, &scene, &grid, &options, HiddenLines::PerHypothesis);
     assert_eq!(shared.best_index, exact.best_index);
     let worst = shared.scores.iter().zip(&exact.scores).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
     assert!(worst < 0.02, "largest change of a score: {worst}");
     for threads in [1, 3] {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        let again = pool.install(|| search(&edges, &scene, &grid, &options, HiddenLines::PerColumn));
+        let again = pool.install(|| search(&edges, &scene, &grid, &options, HiddenLines::PerTile));
         assert!(again.scores.iter().zip(&shared.scores).all(|(a, b)| a.to_bits() == b.to_bits()));
     }
 }
@@ -266,11 +266,11 @@ fn every_instruction_set_gives_the_same_bits() {
     let (edges, options) = (edges_of(&scene, &truth), SimilarityOptions::default());
     let visible = scene.visible(&Hypothesis { phase: 0.35, ..truth }, &LINES_ONLY);
     let on = |arch: pulp::Arch| {
-        arch.dispatch(Raised {
-            scorer: &ColumnScorer::new(&edges, &options),
-            projection: &Projection::new(&camera, DVec3::ZERO),
+        arch.dispatch(Moved {
+            scorer: &LaneScorer::new(&edges, &options),
+            projection: &Projection::new(&camera, DVec3::ZERO, path.direction()),
             visible: &visible,
-            raised_m: std::array::from_fn(|i| 0.01 * i as f32 - 0.08),
+            moved_m: [0.01, 0.02].map(|step| std::array::from_fn(|i| step * i as f32 - 0.08)),
             near: &mut Vec::new(),
         })
     };

@@ -261,6 +261,7 @@ fn step(frame: usize, along_m: f64, speed_mps: f64) -> Step {
     let best = state.hypothesis();
     let look = Look {
         window: boxed(100, 399, 80, 200),
+        alongs: Axis::around(along_m, 0.1, 0.02),
         heights: Axis::around(height_m, 0.1, 0.02),
         best,
         path: PATH,

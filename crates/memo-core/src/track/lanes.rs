@@ -1,7 +1,7 @@
-//! Eq. (11) for all heights of one column of the grid at once (Rohr 1994, sections 4.3 and 6).
+//! Eq. (11) for several positions and heights at once (Rohr 1994, sections 4.3 and 6).
 //!
 //! The arithmetic of [`similarity`](super::score::similarity) without branches, in lanes of f32, one lane per
-//! height. The compiler vectorises the loops over lanes, so every function they call is `#[inline(always)]` and
+//! point of the grid. The compiler vectorises the loops over lanes, so every function they call is `#[inline(always)]` and
 //! the caller dispatches on the instruction set. No operation is fused or reordered: the scores have the same
 //! bits on every instruction set.
 //!
@@ -11,11 +11,11 @@
 
 use super::score::{ANGLE_CUT_SIGMA, EdgeLine, Measure, PreparedEdge, SHORTEST_LINE_PX, SimilarityOptions};
 use crate::model::Camera;
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
-/// Heights evaluated together: the paper's grid has 11.
+/// Points of the grid evaluated together.
 pub(super) const LANES: usize = 16;
-/// One f32 for each height.
+/// One f32 for each point.
 pub(super) type Lanes = [f32; LANES];
 /// Edges tested together for being near a line, one byte of a word each. It is 16 because loops of 8 are unrolled
 /// before they can be vectorised, which makes this test more than twice as slow.
@@ -27,40 +27,41 @@ const SLACK_PX: f32 = 0.01;
 /// Maximum effect of rounding on the direction of an edge, as a sine.
 const SLACK_SINE: f32 = 1e-4;
 
-/// The image of a point raised by z, in homogeneous pixels: `base` + z `per_metre`, because the projection is
-/// linear before its division.
+/// The image of a point moved ahead by x and up by z, in homogeneous pixels: `base` + x `per_metre[0]` +
+/// z `per_metre[1]`, because the projection is linear before its division.
 #[derive(Clone, Copy)]
-struct RaisedPoint {
+struct MovedPoint {
     base: [f32; 3],
-    per_metre: [f32; 3],
+    per_metre: [[f32; 3]; 2],
 }
 
 /// Projection to ideal pixels for a body that was posed elsewhere and is moved to its position.
 pub(super) struct Projection<'a> {
     camera: &'a Camera,
     place: DVec3,
-    per_metre: [f32; 3],
+    per_metre: [[f32; 3]; 2],
     /// Outer borders of the outermost pixels.
     low: [f32; 2],
     high: [f32; 2],
 }
 
 impl<'a> Projection<'a> {
-    /// The projection of points that are moved by `place` first.
-    pub(super) fn new(camera: &'a Camera, place: DVec3) -> Self {
+    /// The projection of points that are moved by `place` first, then in the direction `ahead` and up.
+    pub(super) fn new(camera: &'a Camera, place: DVec3, ahead: DVec2) -> Self {
+        let of_direction = |direction: DVec3| homogeneous(camera, camera.rotation * direction);
         Self {
             camera,
             place,
-            per_metre: homogeneous(camera, camera.rotation.z_axis),
+            per_metre: [of_direction(ahead.extend(0.0)), of_direction(DVec3::Z)],
             low: [-0.5; 2],
             high: camera.size.map(|size| size as f32 - 0.5),
         }
     }
 
     #[inline(always)]
-    fn point(&self, point: DVec3) -> RaisedPoint {
+    fn point(&self, point: DVec3) -> MovedPoint {
         let base = homogeneous(self.camera, self.camera.camera_from_world(point + self.place));
-        RaisedPoint { base, per_metre: self.per_metre }
+        MovedPoint { base, per_metre: self.per_metre }
     }
 }
 
@@ -81,7 +82,7 @@ struct Line {
     inverse_length: f32,
 }
 
-/// A visible piece of contour at each height, clipped to the image.
+/// A visible piece of contour at each point, clipped to the image.
 pub(super) struct LineLanes {
     start: [Lanes; 2],
     direction: [Lanes; 2],
@@ -90,14 +91,14 @@ pub(super) struct LineLanes {
 }
 
 impl LineLanes {
-    /// The piece from `start` to `end`, raised by each value of `raised_m`.
+    /// The piece from `start` to `end`, moved ahead and up by each value of `moved_m`.
     #[inline(always)]
-    pub(super) fn new(projection: &Projection<'_>, start: DVec3, end: DVec3, raised_m: &Lanes) -> Self {
+    pub(super) fn new(projection: &Projection<'_>, start: DVec3, end: DVec3, moved_m: &[Lanes; 2]) -> Self {
         let (start, end) = (projection.point(start), projection.point(end));
         let zero = [0.0; LANES];
         let mut lanes = Self { start: [zero; 2], direction: [zero; 2], length: zero, inverse_length: zero };
         for i in 0..LANES {
-            let line = Line::new(projection, &start, &end, raised_m[i]);
+            let line = Line::new(projection, &start, &end, [moved_m[0][i], moved_m[1][i]]);
             lanes.start[0][i] = line.start[0];
             lanes.start[1][i] = line.start[1];
             lanes.direction[0][i] = line.direction[0];
@@ -121,9 +122,9 @@ impl LineLanes {
 
 impl Line {
     #[inline(always)]
-    fn new(projection: &Projection<'_>, start: &RaisedPoint, end: &RaisedPoint, raised_m: f32) -> Self {
-        let ([x0, y0], depth0) = start.pixel(raised_m);
-        let ([x1, y1], depth1) = end.pixel(raised_m);
+    fn new(projection: &Projection<'_>, start: &MovedPoint, end: &MovedPoint, moved_m: [f32; 2]) -> Self {
+        let ([x0, y0], depth0) = start.pixel(moved_m);
+        let ([x1, y1], depth1) = end.pixel(moved_m);
         let (dx, dy) = (x1 - x0, y1 - y0);
         let (x_in, x_out) = clip(x0, dx, projection.low[0], projection.high[0]);
         let (y_in, y_out) = clip(y0, dy, projection.low[1], projection.high[1]);
@@ -158,11 +159,11 @@ impl Line {
     }
 }
 
-impl RaisedPoint {
+impl MovedPoint {
     /// The pixel and the depth.
     #[inline(always)]
-    fn pixel(&self, raised_m: f32) -> ([f32; 2], f32) {
-        let at = |k: usize| self.base[k] + raised_m * self.per_metre[k];
+    fn pixel(&self, [x, z]: [f32; 2]) -> ([f32; 2], f32) {
+        let at = |k: usize| self.base[k] + x * self.per_metre[0][k] + z * self.per_metre[1][k];
         let (x, y, depth) = (at(0), at(1), at(2));
         let inverse_depth = 1.0 / depth;
         ([x * inverse_depth, y * inverse_depth], depth)
@@ -170,7 +171,7 @@ impl RaisedPoint {
 }
 
 /// The edges of a frame, prepared for the columns of a grid.
-pub(super) struct ColumnScorer<'a> {
+pub(super) struct LaneScorer<'a> {
     /// In descending order of the most they can contribute.
     edges: Vec<PreparedEdge>,
     batches: Vec<EdgeBatch>,
@@ -207,7 +208,7 @@ impl Constants {
     }
 }
 
-impl<'a> ColumnScorer<'a> {
+impl<'a> LaneScorer<'a> {
     pub(super) fn new(edges: &[EdgeLine], options: &'a SimilarityOptions) -> Self {
         let mut edges: Vec<_> = edges.iter().map(|edge| PreparedEdge::new(edge, options)).collect();
         edges.sort_by(|a, b| b.most().total_cmp(&a.most()));
@@ -215,7 +216,7 @@ impl<'a> ColumnScorer<'a> {
         Self { edges, batches, options, constants: Constants::new(options) }
     }
 
-    /// w_K s_i of a line at each height: the best of the edges in `near`.
+    /// w_K s_i of a line at each point: the best of the edges in `near`.
     #[inline(always)]
     pub(super) fn best(&self, part: usize, lines: &LineLanes, near: &[u32]) -> Lanes {
         let mut best = match self.options.measure {
@@ -228,12 +229,12 @@ impl<'a> ColumnScorer<'a> {
         best
     }
 
-    /// By eq. (7) no edge contributes more than its length: once every height has more than that, the remaining
+    /// By eq. (7) no edge contributes more than its length: once every point has more than that, the remaining
     /// edges are skipped.
     #[inline(always)]
     fn best_by_rohr(&self, lines: &LineLanes, near: &[u32]) -> Lanes {
         let mut best = [0.0; LANES];
-        // Heights at which no line is visible need no edge.
+        // Points at which no line is visible need no edge.
         let mut least = [0.0; LANES];
         for i in 0..LANES {
             least[i] = if lines.length[i] > 0.0 { 0.0 } else { f32::INFINITY };
@@ -263,7 +264,7 @@ impl<'a> ColumnScorer<'a> {
         best
     }
 
-    /// The edges that may match the line at one of the heights.
+    /// The edges that may match the line at one of the points.
     #[inline(always)]
     pub(super) fn near(&self, lines: &LineLanes, near: &mut Vec<u32>) {
         near.clear();
@@ -390,7 +391,7 @@ fn select(condition: bool, value: f32) -> f32 {
     if condition { value } else { 0.0 }
 }
 
-/// The rectangle that contains the windows of a line at all heights, in axes along the line's mean direction.
+/// The rectangle that contains the windows of a line at all points, in axes along the line's mean direction.
 struct Area {
     axes: Line,
     middle: [f32; 2],
@@ -426,8 +427,8 @@ impl Area {
 }
 
 impl Line {
-    /// Axes at the start of the first height's line (at the origin if it has none) along the mean direction of
-    /// all heights.
+    /// Axes at the start of the first point's line (at the origin if it has none) along the mean direction of all
+    /// points.
     #[inline(always)]
     fn mean(lines: &LineLanes) -> Self {
         let sum = |lanes: Lanes| reduce(lanes, |a, b| a + b);
@@ -521,14 +522,18 @@ mod tests {
         Camera::level([640, 480], 0.9, 1.1, 6.0).unwrap()
     }
 
-    /// s_i at each height by the plain similarity; `None` if an angle is so close to the largest compared angle
+    /// The direction in which points are moved.
+    const AHEAD: DVec2 = DVec2::new(0.8, 0.6);
+
+    /// s_i at each point by the plain similarity; `None` if an angle is so close to the largest compared angle
     /// that rounding decides.
-    fn plainly(piece: &VisibleSegment, raised_m: &Lanes, edges: &[EdgeLine]) -> Option<Lanes> {
+    fn plainly(piece: &VisibleSegment, moved_m: &[Lanes; 2], edges: &[EdgeLine]) -> Option<Lanes> {
         let options = SimilarityOptions::default();
         let mut all = [0.0; LANES];
-        for (s, z) in all.iter_mut().zip(raised_m) {
-            let up = DVec3::Z * f64::from(*z);
-            let piece = VisibleSegment { start: piece.start + up, end: piece.end + up, ..*piece };
+        for (i, s) in all.iter_mut().enumerate() {
+            let [x, z] = moved_m.map(|m| f64::from(m[i]));
+            let moved = (x * AHEAD).extend(z);
+            let piece = VisibleSegment { start: piece.start + moved, end: piece.end + moved, ..*piece };
             let Some(line) = project(&piece, &camera()) else { continue };
             let found = similarity(&[line], edges, &options);
             let cut = ANGLE_CUT_SIGMA * options.sigma_phi_rad;
@@ -557,10 +562,11 @@ mod tests {
     proptest! {
         /// Also tests pieces that leave the image, pass behind the camera or are short.
         #[test]
-        fn every_height_answers_as_the_plain_similarity(
+        fn every_point_answers_as_the_plain_similarity(
             ends in prop::array::uniform3(-1.5f64..1.5),
             along in prop::array::uniform3(-0.6f64..0.6),
-            (depth, span) in (-6.5f64..8.0, prop_oneof![Just(0.0f32), 0.0f32..0.5]),
+            depth in -6.5f64..8.0,
+            spans in prop::array::uniform2(prop_oneof![Just(0.0f32), 0.0f32..0.5]),
             edges in prop::collection::vec(
                 (-0.5f32..1.5, prop_oneof![-0.05f32..0.05, -0.5f32..0.5], 0.0f32..1.5, prop_oneof![-0.1f32..0.1, -0.8f32..0.8]), 1..20),
         ) {
@@ -569,14 +575,16 @@ mod tests {
             let piece = VisibleSegment { part: 3, kind: ContourKind::Left, start, end: start + DVec3::from(along) };
             let line = project(&piece, &camera).unwrap_or(ModelLine { part: 3, start: [300.0, 80.0], end: [310.0, 180.0] });
             let edges: Vec<_> = edges.iter().map(|&shape| edge_about(&line, shape)).collect();
-            let raised_m: Lanes = std::array::from_fn(|i| span * (i as f32 / 7.5 - 1.0));
-            let plain = plainly(&piece, &raised_m, &edges);
+            // Up from low to high, and ahead in another order.
+            let steps = [5, 1].map(|factor: usize| std::array::from_fn(|i| ((factor * i) % LANES) as f32 / 7.5 - 1.0));
+            let moved_m = [0, 1].map(|k| (steps[k] as Lanes).map(|step| spans[k] * step));
+            let plain = plainly(&piece, &moved_m, &edges);
             prop_assume!(plain.is_some());
             let options = SimilarityOptions::default();
-            let scorer = ColumnScorer::new(&edges, &options);
+            let scorer = LaneScorer::new(&edges, &options);
             let place = DVec3::new(0.3, -0.2, 0.1);
-            let projection = Projection::new(&camera, place);
-            let lines = LineLanes::new(&projection, start - place, piece.end - place, &raised_m);
+            let projection = Projection::new(&camera, place, AHEAD);
+            let lines = LineLanes::new(&projection, start - place, piece.end - place, &moved_m);
             let mut near = Vec::new();
             scorer.near(&lines, &mut near);
             let fast = scorer.best(piece.part, &lines, &near);
