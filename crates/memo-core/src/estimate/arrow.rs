@@ -22,9 +22,39 @@ pub struct Arrow {
     frames: Banded,
     /// Cᵀ: one column per unknown of a frame.
     coupling: DMatrix<f64>,
+    /// Its lower triangle; what is above the diagonal is not read.
     whole: DMatrix<f64>,
     right_frames: Vec<f64>,
     right_whole: DVector<f64>,
+}
+
+/// Normal equations of some frames in a row.
+#[derive(Debug, Clone)]
+pub struct FrameTerms {
+    /// Over the unknowns of the whole: the lower triangle.
+    pub whole: DMatrix<f64>,
+    /// The right side of these.
+    pub right_whole: DVector<f64>,
+    /// The rest, by frame.
+    pub frames: Vec<OfFrame>,
+}
+
+/// Normal equations of one frame, but for those over the unknowns of the whole alone.
+#[derive(Debug, Clone)]
+pub struct OfFrame {
+    /// Over the unknowns of the whole (rows) and of the frame (columns).
+    pub coupling: DMatrix<f64>,
+    /// Over those of the frame: the lower triangle.
+    pub own: DMatrix<f64>,
+    /// The right side of these.
+    pub right: DVector<f64>,
+}
+
+impl FrameTerms {
+    /// No frames yet, of a sequence with so many unknowns of the whole.
+    pub fn new(whole: usize) -> Self {
+        Self { whole: DMatrix::zeros(whole, whole), right_whole: DVector::zeros(whole), frames: Vec::new() }
+    }
 }
 
 /// A symmetric matrix, or its factor L, as the lower band by rows: row i holds columns i - width to i.
@@ -112,20 +142,21 @@ impl Arrow {
         frame * self.block + unknown
     }
 
-    /// Adds normal equations over the unknowns of the whole, followed by those of one frame.
-    pub fn add_frame(&mut self, frame: usize, normal: &DMatrix<f64>, right: &DVector<f64>) {
-        let (whole, block) = (self.right_whole.len(), self.block);
-        self.whole += normal.view((0, 0), (whole, whole));
-        self.right_whole += right.rows(0, whole);
-        for i in 0..block {
-            let at = frame * block + i;
-            let mut column = self.coupling.column_mut(at);
-            column += normal.view((0, whole + i), (whole, 1));
-            for j in 0..=i {
-                let index = self.frames.index(at, frame * block + j);
-                self.frames.values[index] += normal[(whole + i, whole + j)];
+    /// Adds the normal equations of some frames, the first of which is `first`.
+    pub fn add_frames(&mut self, first: usize, terms: &FrameTerms) {
+        self.whole += &terms.whole;
+        self.right_whole += &terms.right_whole;
+        for (n, of_frame) in terms.frames.iter().enumerate() {
+            let before = (first + n) * self.block;
+            for i in 0..self.block {
+                let mut column = self.coupling.column_mut(before + i);
+                column += of_frame.coupling.column(i);
+                for j in 0..=i {
+                    let index = self.frames.index(before + i, before + j);
+                    self.frames.values[index] += of_frame.own[(i, j)];
+                }
+                self.right_frames[before + i] += of_frame.right[i];
             }
-            self.right_frames[at] += right[whole + i];
         }
     }
 
@@ -252,6 +283,7 @@ mod tests {
             h += weight * &row * row.transpose();
             b += weight * right * row;
         };
+        let mut terms = FrameTerms::new(whole);
         for frame in 0..frames {
             // More observations than unknowns of a frame.
             let (mut normal, mut right) =
@@ -266,7 +298,20 @@ mod tests {
                 dense.rows_mut(whole + frame * block, block).copy_from(&row.rows(whole, block));
                 add(dense, value, 1.0);
             }
-            arrow.add_frame(frame, &normal, &right);
+            // What is above the diagonal is not read.
+            let whole_only = (normal.view((0, 0), (whole, whole)).lower_triangle(), right.rows(0, whole));
+            terms.whole += whole_only.0;
+            terms.right_whole += whole_only.1;
+            terms.frames.push(OfFrame {
+                coupling: normal.view((0, whole), (whole, block)).into_owned(),
+                own: normal.view((whole, whole), (block, block)).lower_triangle(),
+                right: right.rows(whole, block).into_owned(),
+            });
+            // Two frames are added at a time.
+            if terms.frames.len() == 2 || frame + 1 == frames {
+                let added = std::mem::replace(&mut terms, FrameTerms::new(whole));
+                arrow.add_frames(frame + 1 - added.frames.len(), &added);
+            }
             if frame >= 2 {
                 let unknown = frame % block;
                 let terms: Vec<_> =

@@ -7,6 +7,7 @@
 
 use super::problem::{Fitted, Problem};
 use super::seen::Seen;
+use super::unknowns::Unknowns;
 use super::{FitError, LEAST_FRAMES, MirroredHeading, WalkFit};
 use std::f64::consts::TAU;
 
@@ -82,13 +83,18 @@ fn choices<'p, 'a>(
         return Err(FitError::TooFewFrames { got: problem.frame_count() });
     }
     let (start, gait) = problem.best_start(0.0).ok_or(FitError::Undetermined)?;
+    let there = mirrored.started(0.5, gait.mirrored()).map(|(_, start)| start);
+    let exchanged = |start: &Unknowns| are_all.then(|| start.exchanged());
+    let starts = [
+        (false, exchanged(&start), true),
+        (true, there.as_ref().and_then(exchanged), false),
+        (true, there, true),
+    ];
     let fitted = problem.finished(start).ok_or(FitError::Undetermined)?;
     let mut choices = vec![Choice { problem, is_mirrored: false, is_exchanged: false, fitted }];
-    let others = [(true, true), (false, true), (true, false)];
-    for (is_mirrored, is_exchanged) in others.into_iter().take(if are_all { 3 } else { 1 }) {
+    for (is_mirrored, start, is_exchanged) in starts {
         let problem = if is_mirrored { mirrored } else { problem };
-        let (phase, gait) = if is_exchanged { (0.5, gait.mirrored()) } else { (0.0, gait) };
-        let fitted = problem.started(phase, gait).and_then(|(_, start)| problem.finished(start));
+        let fitted = start.and_then(|start| problem.finished(start));
         choices.extend(fitted.map(|fitted| Choice { problem, is_mirrored, is_exchanged, fitted }));
     }
     Ok(choices)

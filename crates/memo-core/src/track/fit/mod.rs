@@ -22,6 +22,7 @@ pub mod contacts;
 pub(crate) mod edge_search;
 mod headings;
 mod lines;
+mod normal;
 pub(crate) mod of_walk;
 mod problem;
 mod quality;

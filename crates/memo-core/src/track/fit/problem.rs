@@ -4,15 +4,16 @@ mod outcome;
 
 use super::edge_search::{Border, Reach, View};
 use super::lines::{Figure, Sample, Workspace, gradient, row_of, samples};
+use super::normal::{Chain, FigureTerms};
 use super::route::{Bend, figure_slopes};
 use super::seen::{LEAST_STEP, Seen};
 use super::unknowns::{
-    BEND, FIGURE, FRAME, FRAME_ALONG, FRAME_ANGLES, FRAME_HEIGHT, FRAME_PHASE, JOINTS, Prior, STATURE, Slope,
+    BEND, FRAME, FRAME_ALONG, FRAME_ANGLES, FRAME_HEIGHT, FRAME_PHASE, JOINTS, Prior, STATURE, Slope,
     Unknowns, WHOLE, WHOLE_ACROSS, WHOLE_BEND, WHOLE_HEADING, WHOLE_LEAN, body, flatten, mean_of, posture,
     priors, slopes, sway_m,
 };
 use super::{FitError, FitOptions, LEAST_FRAMES, WalkFit, sides};
-use crate::estimate::arrow::{Arrow, Solution, velocity_change};
+use crate::estimate::arrow::{Arrow, FrameTerms, Solution, velocity_change};
 use crate::model::body::Part;
 use crate::model::{Camera, Gait, GaitStyle, Walker};
 use crate::track::height::BodyHeight;
@@ -120,8 +121,9 @@ const STEPS: [usize; 3] = [4, 4, 4];
 /// the first and at the last step.
 const REACH: [f64; 2] = [0.06, 0.02];
 const SCALE: [f64; 2] = [0.03, 0.008];
-/// So many frames' normal equations are in memory at a time.
-const FRAMES_AT_ONCE: usize = 64;
+/// So many frames in a row are a task, and the normal equations of so many tasks are in memory at a time.
+const FRAMES_OF_TASK: usize = 4;
+const TASKS_AT_ONCE: usize = 64;
 /// Sample points per body height. Their edges err together, so each counts with a standard deviation of their
 /// distance from each other.
 const SAMPLES_PER_HEIGHT: f64 = 75.0;
@@ -207,10 +209,10 @@ impl<'a> Problem<'a> {
         if self.frames.len() < LEAST_FRAMES {
             return Err(FitError::TooFewFrames { got: self.frames.len() });
         }
-        let (start, gait) = self.best_start(0.0).ok_or(FitError::Undetermined)?;
-        let exchanged = || self.finished(self.started(0.5, gait.mirrored())?.1);
+        let (start, _) = self.best_start(0.0).ok_or(FitError::Undetermined)?;
+        let exchanged = p_tracked_swapped.map(|_| start.exchanged());
         let (as_tracked, exchanged) =
-            rayon::join(|| self.finished(start), || p_tracked_swapped.and_then(|_| exchanged()));
+            rayon::join(|| self.finished(start), || exchanged.and_then(|start| self.finished(start)));
         let as_tracked = as_tracked.ok_or(FitError::Undetermined)?;
         let p_tracked = p_tracked_swapped.unwrap_or(0.0);
         let p_exchanged =
@@ -362,14 +364,20 @@ impl<'a> Problem<'a> {
         let mut arrow = Arrow::new(self.frames.len(), block, WHOLE);
         let mut seen = Seen::default();
         let frames: Vec<usize> = (0..self.frames.len()).collect();
-        // The terms of all frames of a long walk would need much memory at once.
-        for frames in frames.chunks(FRAMES_AT_ONCE) {
-            let terms = frames.par_iter().map_init(Room::default, |room, &frame| {
-                (frame, self.frame_terms(unknowns, frame, stage, width, room))
+        // The terms of all frames of a long walk would need much memory at once. Those of a task are added in their order,
+        // whatever the number of threads.
+        for frames in frames.chunks(TASKS_AT_ONCE * FRAMES_OF_TASK) {
+            let terms = frames.par_chunks(FRAMES_OF_TASK).map_init(Room::default, |room, frames| {
+                let mut terms = FrameTerms::new(WHOLE);
+                let mut seen = Seen::default();
+                for &frame in frames {
+                    seen.add(&self.add_frame(unknowns, frame, stage, width, room, &mut terms));
+                }
+                (frames[0], terms, seen)
             });
-            for (frame, (normal, right, of_frame)) in terms.collect::<Vec<_>>() {
-                arrow.add_frame(frame, &normal, &right);
-                seen.add(&of_frame);
+            for (first, terms, of_frames) in terms.collect::<Vec<_>>() {
+                arrow.add_frames(first, &terms);
+                seen.add(&of_frames);
             }
         }
         self.add_priors(unknowns, block, &mut arrow);
@@ -382,16 +390,16 @@ impl<'a> Problem<'a> {
         Some((seen, solution))
     }
 
-    /// The normal equations of one frame over the unknowns of the whole and the first `block` of the frame, and what
-    /// was seen.
-    fn frame_terms(
+    /// Adds the normal equations of one frame; returns what was seen.
+    fn add_frame(
         &self,
         unknowns: &Unknowns,
         frame: usize,
         stage: Stage,
         width: &Width,
         room: &mut Room,
-    ) -> (DMatrix<f64>, DVector<f64>, Seen) {
+        terms: &mut FrameTerms,
+    ) -> Seen {
         let block = if stage == Stage::Frames { FRAME } else { FRAME_ANGLES };
         let (figure, normal, right, seen) = self.figure_terms(unknowns, frame, width, room);
         slopes(&self.walker.gait, &unknowns.whole, &unknowns.frames[frame], &mut room.slopes);
@@ -404,8 +412,8 @@ impl<'a> Problem<'a> {
                 room.slopes.extend(slopes.map(|(q, slope)| (q, WHOLE_BEND + j, slope)));
             }
         }
-        let (normal, right) = of_unknowns(&normal, &right, &room.slopes, WHOLE + block);
-        (normal, right, seen)
+        room.chain.add(&normal, &right, &room.slopes, block, terms);
+        seen
     }
 
     /// The figure of a frame, the normal equations over its coordinates, and what was seen.
@@ -546,6 +554,7 @@ impl Width {
 pub(super) struct Room {
     work: Workspace,
     slopes: Vec<Slope>,
+    chain: Chain,
 }
 
 /// A fit with one choice of sides.
@@ -604,104 +613,6 @@ const RATES: [f64; FRAME] = {
     rates[FRAME_PHASE] = 0.19;
     rates
 };
-
-/// Normal equations over the coordinates of the figure.
-struct FigureTerms {
-    normal: DMatrix<f64>,
-    right: DVector<f64>,
-    /// The latest terms, which depend on the same few coordinates: those of the samples of one part.
-    part: PartTerms,
-}
-
-#[derive(Debug, Default)]
-struct PartTerms {
-    coordinates: Vec<usize>,
-    slopes: Vec<f64>,
-    normal: Vec<f64>,
-    right: Vec<f64>,
-}
-
-impl FigureTerms {
-    fn new() -> Self {
-        Self {
-            normal: DMatrix::zeros(FIGURE, FIGURE),
-            right: DVector::zeros(FIGURE),
-            part: PartTerms::default(),
-        }
-    }
-
-    /// Adds weight (Σ slope q - offset)².
-    fn add(&mut self, slopes: impl ExactSizeIterator<Item = (usize, f64)> + Clone, offset: f64, weight: f64) {
-        let coordinates = slopes.clone().map(|(q, _)| q);
-        if !coordinates.clone().eq(self.part.coordinates.iter().copied()) {
-            self.add_part();
-            let count = slopes.len();
-            self.part.coordinates.clear();
-            self.part.coordinates.extend(coordinates);
-            for sums in [&mut self.part.normal, &mut self.part.right] {
-                sums.clear();
-            }
-            self.part.normal.resize(count * count, 0.0);
-            self.part.right.resize(count, 0.0);
-        }
-        let PartTerms { slopes: values, normal, right, .. } = &mut self.part;
-        values.clear();
-        values.extend(slopes.map(|(_, slope)| slope));
-        for ((row, right), a) in normal.chunks_exact_mut(values.len().max(1)).zip(right).zip(values.iter()) {
-            add_scaled(row, values, weight * a);
-            *right += weight * a * offset;
-        }
-    }
-
-    fn add_part(&mut self) {
-        let PartTerms { coordinates, normal, right, .. } = &self.part;
-        for ((&i, row), of_right) in
-            coordinates.iter().zip(normal.chunks_exact(coordinates.len().max(1))).zip(right)
-        {
-            for (&j, sum) in coordinates.iter().zip(row) {
-                self.normal[(i, j)] += sum;
-            }
-            self.right[i] += of_right;
-        }
-    }
-
-    fn sums(mut self) -> (DMatrix<f64>, DVector<f64>) {
-        self.add_part();
-        (self.normal, self.right)
-    }
-}
-
-/// Normal equations over the figure as those over the first `count` unknowns: Aᵀ H A and Aᵀ b, with the slopes A.
-fn of_unknowns(
-    normal: &DMatrix<f64>,
-    right: &DVector<f64>,
-    slopes: &[Slope],
-    count: usize,
-) -> (DMatrix<f64>, DVector<f64>) {
-    let mut half = DMatrix::<f64>::zeros(FIGURE, count);
-    let mut of_right = DVector::<f64>::zeros(count);
-    let slopes = slopes.iter().filter(|s| s.1 < count);
-    for &(q, unknown, slope) in slopes.clone() {
-        add_scaled(column(&mut half, unknown), normal.column(q).as_slice(), slope);
-        of_right[unknown] += slope * right[q];
-    }
-    let half = half.transpose();
-    let mut of_unknowns = DMatrix::<f64>::zeros(count, count);
-    for &(q, unknown, slope) in slopes {
-        add_scaled(column(&mut of_unknowns, unknown), half.column(q).as_slice(), slope);
-    }
-    (of_unknowns, of_right)
-}
-
-fn column(matrix: &mut DMatrix<f64>, at: usize) -> &mut [f64] {
-    let rows = matrix.nrows();
-    &mut matrix.as_mut_slice()[at * rows..][..rows]
-}
-
-/// A plain loop is several times as fast as a library call for columns of a hundred numbers.
-fn add_scaled(into: &mut [f64], from: &[f64], by: f64) {
-    into.iter_mut().zip(from).for_each(|(x, y)| *x += by * y);
-}
 
 #[cfg(test)]
 mod tests;

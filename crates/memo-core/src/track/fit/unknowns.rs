@@ -216,6 +216,19 @@ pub struct Unknowns {
     pub frames: Vec<[f64; FRAME]>,
 }
 
+impl Unknowns {
+    /// The same movement of the other side's limbs.
+    pub fn exchanged(&self) -> Self {
+        let Self { mut whole, mut frames } = self.clone();
+        frames.iter_mut().for_each(|frame| frame[FRAME_PHASE] += 0.5);
+        for joint in 0..JOINTS {
+            let opposite = mean_of(joint) + terms(joint);
+            whole[opposite..opposite + terms(joint)].iter_mut().for_each(|term| *term = -*term);
+        }
+        Self { whole, frames }
+    }
+}
+
 /// The terms of a Fourier series at a phase, and their derivatives by it: 1, cos, sin, cos of twice the phase, ...
 fn fourier(phase: f64) -> [[f64; 1 + 2 * MOST_HARMONICS]; 2] {
     let mut terms = [[0.0; 1 + 2 * MOST_HARMONICS]; 2];
