@@ -224,7 +224,7 @@ impl Candidate {
         let mut of_average = average.search(&edges, options);
         let first = of_average.glance(GLANCE_EVERY).ok_or(Reason::NotWalking)?;
         let promising = |entered: Entered| {
-            let mut search = entered.search(&edges, options);
+            let mut search = entered.search(&edges, options).after(&of_average);
             let glance = search.glance(GLANCE_EVERY)?;
             let is_similar = glance.similarity >= GLANCE_SHARE * first.similarity;
             (is_similar && glance.contrast >= GLANCE_CONTRAST)

@@ -11,6 +11,7 @@
 //!
 //! Both twins are returned, and [`swap_probability`] is the probability that the wrong one was chosen.
 
+use super::decisions::OTHER_WAY_SHARE;
 use super::locate::Course;
 use super::search::{Grid, Hypothesis, Path, Scene, search_each_phase};
 use super::swap::swap_probability;
@@ -265,6 +266,8 @@ struct Faced {
     path: Path,
     /// Best hypothesis and similarity at each phase, of the frames searched so far.
     found: Vec<Option<Vec<(Hypothesis, f32)>>>,
+    /// True once some frames were enough to tell that the body does not face this way.
+    is_out: bool,
 }
 
 /// The search for a start on a few frames: [`glance`](Self::glance) at some of them, then [`finish`](Self::finish).
@@ -314,18 +317,30 @@ impl<'a> StartSearch<'a> {
     ) -> Self {
         let path = course.path;
         let back = Path { heading_rad: path.heading_rad + std::f64::consts::PI, ..path };
-        let faced = [path, back].map(|path| Faced { path, found: vec![None; frames.len()] });
+        let faced = [path, back].map(|path| Faced { path, found: vec![None; frames.len()], is_out: false });
         let reversed = CadenceRange { low_hz: -rates.high_hz, high_hz: -rates.low_hz };
         Self { frames, course, walker, camera, rates: [*rates, reversed], options, faced }
     }
 
-    /// Searches every `every`-th frame. `None` if there are no frames.
+    /// The same with what another search on these frames found of the directions that the body does not face.
+    #[must_use]
+    pub fn after(mut self, other: &Self) -> Self {
+        for (faced, known) in self.faced.iter_mut().zip(&other.faced).filter(|(_, known)| known.is_out) {
+            faced.found.clone_from(&known.found);
+            faced.is_out = true;
+        }
+        self
+    }
+
+    /// Searches every `every`-th frame. `None` if there are no frames. A direction that is much worse than the other is not
+    /// looked at any more.
     pub fn glance(&mut self, every: usize) -> Option<Glance> {
         self.look(every);
         let curves = self.curves();
         let lines = self.lines(&curves)?;
         let better = usize::from(lines[1].best.similarity > lines[0].best.similarity);
         let similarity = lines[better].best.similarity;
+        self.faced[1 - better].is_out = lines[1 - better].best.similarity < OTHER_WAY_SHARE * similarity;
         Some(Glance { similarity, contrast: contrast(similarity, &curves[better]) })
     }
 
@@ -363,10 +378,10 @@ impl<'a> StartSearch<'a> {
         })
     }
 
-    /// Searches every `every`-th frame that has not been searched yet, for both directions.
+    /// Searches every `every`-th frame that has not been searched yet, for the directions that the body may face.
     fn look(&mut self, every: usize) {
         let height_m = self.walker.level_torso_height_m();
-        for (faced, sign) in self.faced.iter_mut().zip([1.0, -1.0]) {
+        for (faced, sign) in self.faced.iter_mut().zip([1.0, -1.0]).filter(|(faced, _)| !faced.is_out) {
             let scene = Scene::new(self.walker, self.camera, &faced.path);
             let frames = self.frames.iter().zip(&self.course.along_m).zip(&mut faced.found);
             for ((frame, along_m), found) in frames.step_by(every) {

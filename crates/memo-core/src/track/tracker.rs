@@ -52,6 +52,7 @@ use crate::image::{
 use crate::model::body::BodyError;
 use crate::model::{Body, Camera, EllipticCylinder};
 use glam::DVec2;
+use rayon::prelude::*;
 use std::collections::BTreeMap;
 use thiserror::Error;
 use unfollowed::{Moving, walk_boxes, with_small_ones};
@@ -427,7 +428,12 @@ impl Tracker {
         expected: &[Expected],
         regions: &[Rectangle],
     ) -> Result<(), TrackError> {
-        for (k, own) in expected.iter().enumerate() {
+        let cameras: Vec<&Camera> = self.people.iter().map(|active| &active.camera).collect();
+        let windows = expected.par_iter().zip(cameras);
+        let edges: Vec<FrameEdges> = windows
+            .map(|(own, camera)| self.edges(evidence, &own.window, Some(camera)))
+            .collect::<Result<_, _>>()?;
+        for (k, (own, mut edges)) in expected.iter().zip(edges).enumerate() {
             let meeting: Vec<usize> =
                 (0..expected.len()).filter(|&other| other != k && own.meets(&expected[other])).collect();
             // 1. Nearer people, whose places in this frame are known, stand in front.
@@ -435,7 +441,6 @@ impl Tracker {
             let others: Vec<EllipticCylinder> =
                 nearer.filter_map(|&other| self.people[other].body()).flatten().collect();
             // 2. Edges of one's own.
-            let mut edges = self.edges(evidence, &own.window, Some(&self.people[k].camera))?;
             keep_own(
                 &mut edges.edges,
                 own,

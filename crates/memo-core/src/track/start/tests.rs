@@ -266,7 +266,20 @@ fn a_glance_is_a_start_on_some_of_the_frames() {
             let glance = search.glance(n).unwrap();
             let similarity = of_some.lines.best.similarity;
             assert_eq!(glance, Glance { similarity, contrast: of_some.contrast() }, "{n}");
-            assert_eq!(search.finish().unwrap(), whole, "{n}");
+            // Another gait is not looked at in the direction that is out.
+            let mut crouched = StartSearch::new(&frames, &course, &walker, &camera, &rates, &options);
+            crouched = crouched.after(&search);
+            assert_eq!(crouched.glance(n), Some(glance));
+            // In all frames only the direction that some of them left is looked at.
+            for started in [search.finish().unwrap(), crouched.finish().unwrap()] {
+                let other_direction = of_some.other_direction;
+                let (here, there) = (whole.lines.best.similarity, other_direction.similarity);
+                let p_other_direction = swap_probability(here, there, 0.4, &options.swap);
+                assert!((started.p_other_direction / p_other_direction - 1.0).abs() < 1e-9, "{n}");
+                let p_other_direction = started.p_other_direction;
+                let expected = StartReport { p_other_direction, other_direction, ..whole.clone() };
+                assert_eq!(started, expected, "{n}");
+            }
         }
     }
 }
