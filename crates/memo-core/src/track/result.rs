@@ -6,10 +6,10 @@
 //! the difference between the person's body and the model, and the distance.
 
 use super::crowd::body_box;
-use super::decisions::{ACROSS_SD_M, COMMON_PHASE_SD, SAME_BODY};
+use super::decisions::{ACROSS_SD_M, COMMON_PHASE_SD, SAME_BODY, SAME_BODY_OF_POOR};
 use super::event::EventKind;
 use super::fit::contacts::Contact;
-use super::fit::{FitError, FittedFrame, Measured, WalkFit};
+use super::fit::{FitError, FitVerdict, FittedFrame, Measured, WalkFit};
 use super::height::{BodyHeight, HeightSource};
 use super::route::Route;
 use super::search::{Hypothesis, Scene};
@@ -178,8 +178,10 @@ impl TrackedWalk {
         &self.walk.twins[self.walk.best()].steps
     }
 
-    /// True if the body lies on that of another walk in the image, on average over at least half of its frames.
-    pub(super) fn lies_on(&self, other: &Self) -> bool {
+    /// True if the walk is a second model of the person of another walk: its body lies on the other's in the image, on
+    /// average over at least half of its frames, and it is no longer than the other, or it fits poorly beside one that does
+    /// not.
+    pub(super) fn is_double_of(&self, other: &Self) -> bool {
         let frame = |step: Option<&Step>| step.map_or(0, |step| step.frame);
         let [(a, b), (c, d)] =
             [self, other].map(|walk| (frame(walk.steps().first()), frame(walk.steps().last())));
@@ -190,7 +192,13 @@ impl TrackedWalk {
         let overlaps: Vec<f64> =
             own.iter().filter_map(|(frame, sides)| Some(sides.overlap(others.get(frame)?))).collect();
         let mean = overlaps.iter().sum::<f64>() / overlaps.len().max(1) as f64;
-        2 * overlaps.len() >= own.len() && mean > SAME_BODY
+        let is_shorter = self.steps().len() <= other.steps().len();
+        let least = if self.fits_poorly() && !other.fits_poorly() { SAME_BODY_OF_POOR } else { SAME_BODY };
+        2 * overlaps.len() >= own.len() && mean > least && (is_shorter || least < SAME_BODY)
+    }
+
+    fn fits_poorly(&self) -> bool {
+        self.fitted().is_some_and(|fit| fit.quality.verdict() == FitVerdict::Poorly)
     }
 
     /// The box of the body in the image in each frame.

@@ -860,13 +860,13 @@ impl Tracker {
             fit,
             options: self.options.walk,
         };
-        // Two models can come to lie on one person, the fitted ones too: the one that was followed for longer stays.
-        let same = self.finished.iter().position(|other| walk.lies_on(other) || other.lies_on(&walk));
-        if same.is_some_and(|k| self.finished[k].steps().len() >= walk.steps().len()) {
+        // Two models can come to lie on one person, the fitted ones too.
+        if self.finished.iter().any(|other| walk.is_double_of(other)) {
             self.withdraw(walk.person, walk_boxes, Reason::Beside);
             return;
         }
-        if let Some(double) = same.map(|k| self.finished.remove(k)) {
+        if let Some(k) = self.finished.iter().position(|other| other.is_double_of(&walk)) {
+            let double = self.finished.remove(k);
             self.withdraw(double.person, None, Reason::Beside);
         }
         walk_boxes.into_iter().for_each(|walk_boxes| self.unfollowed.followed(walk_boxes));

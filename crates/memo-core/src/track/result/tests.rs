@@ -320,7 +320,7 @@ fn an_assumed_height_widens_places_in_proportion_to_their_distance() {
 }
 
 #[test]
-fn a_walk_lies_on_another_where_their_bodies_overlap_in_half_of_its_frames() {
+fn a_walk_whose_body_lies_on_that_of_a_longer_one_in_half_of_its_frames_is_its_double() {
     let frames = |ahead_m: f64, count: usize| -> Vec<(f64, Option<Hypothesis>)> {
         let at = |k: usize| Hypothesis {
             along_m: ahead_m + 0.048 * k as f64,
@@ -332,11 +332,11 @@ fn a_walk_lies_on_another_where_their_bodies_overlap_in_half_of_its_frames() {
     let path = Path { origin: DVec2::ZERO, heading_rad: 0.0 };
     let walk = |ahead_m: f64, count: usize| followed(path, &frames(ahead_m, count), WalkOptions::default());
     let (long, short) = (walk(-0.5, 30), walk(-0.45, 12));
-    assert!(short.lies_on(&long) && !long.lies_on(&short), "the long one is elsewhere in most frames");
-    assert!(!walk(0.0, 12).lies_on(&long), "half a metre ahead");
+    assert!(short.is_double_of(&long) && !long.is_double_of(&short), "the long one stays");
+    assert!(!walk(0.0, 12).is_double_of(&long), "half a metre ahead");
     let mut later = short.clone();
     for step in later.walk.twins.iter_mut().flat_map(|twin| &mut twin.steps) {
         step.frame += 100;
     }
-    assert!(!later.lies_on(&long));
+    assert!(!later.is_double_of(&long));
 }
