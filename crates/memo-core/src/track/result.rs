@@ -178,9 +178,9 @@ impl TrackedWalk {
         &self.walk.twins[self.walk.best()].steps
     }
 
-    /// True if the walk is a second model of the person of another walk: its body lies on the other's in the image, on
-    /// average over at least half of its frames, and it is no longer than the other, or it fits poorly beside one that does
-    /// not.
+    /// True if the walk is a second model of the person of another walk, and this is the one to withdraw: their bodies lie
+    /// on each other in the image, on average over at least half of the shorter one's frames. The longer one stays, unless
+    /// it alone fits poorly and half of its frames are common to both.
     pub(super) fn is_double_of(&self, other: &Self) -> bool {
         let frame = |step: Option<&Step>| step.map_or(0, |step| step.frame);
         let [(a, b), (c, d)] =
@@ -192,9 +192,17 @@ impl TrackedWalk {
         let overlaps: Vec<f64> =
             own.iter().filter_map(|(frame, sides)| Some(sides.overlap(others.get(frame)?))).collect();
         let mean = overlaps.iter().sum::<f64>() / overlaps.len().max(1) as f64;
-        let is_shorter = self.steps().len() <= other.steps().len();
-        let least = if self.fits_poorly() && !other.fits_poorly() { SAME_BODY_OF_POOR } else { SAME_BODY };
-        2 * overlaps.len() >= own.len() && mean > least && (is_shorter || least < SAME_BODY)
+        let is_off = [self.fits_poorly(), other.fits_poorly()];
+        let least = if is_off[0] == is_off[1] { SAME_BODY } else { SAME_BODY_OF_POOR };
+        let is_common = |frames: usize| 2 * overlaps.len() >= frames;
+        if mean <= least || !is_common(own.len().min(others.len())) {
+            return false;
+        }
+        match is_off {
+            [true, false] if is_common(own.len()) => true,
+            [false, true] if is_common(others.len()) => false,
+            _ => own.len() <= others.len(),
+        }
     }
 
     fn fits_poorly(&self) -> bool {

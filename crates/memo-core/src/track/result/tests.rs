@@ -6,6 +6,7 @@ use super::*;
 use crate::estimate::kalman::FilterOptions;
 use crate::image::Rectangle;
 use crate::synth::Random;
+use crate::track::fit::FitQuality;
 use glam::DVec2;
 
 /// A walk at 1.2 m/s and 0.9 Hz along a path, one hypothesis per frame; for frames without one the filter only
@@ -319,24 +320,70 @@ fn an_assumed_height_widens_places_in_proportion_to_their_distance() {
     }
 }
 
-#[test]
-fn a_walk_whose_body_lies_on_that_of_a_longer_one_in_half_of_its_frames_is_its_double() {
-    let frames = |ahead_m: f64, count: usize| -> Vec<(f64, Option<Hypothesis>)> {
-        let at = |k: usize| Hypothesis {
-            along_m: ahead_m + 0.048 * k as f64,
-            height_m: 1.2,
-            phase: 0.036 * k as f64,
-        };
-        (0..count).map(|k| (0.04 * k as f64, Some(at(k)))).collect()
+/// A walk that begins so far ahead of others, after so many frames.
+fn beside(ahead_m: f64, first: usize, count: usize) -> TrackedWalk {
+    let at =
+        |k: usize| Hypothesis { along_m: ahead_m + 0.048 * k as f64, height_m: 1.2, phase: 0.036 * k as f64 };
+    let frames: Vec<_> = (first..first + count).map(|k| (0.04 * k as f64, Some(at(k)))).collect();
+    let mut walk = followed(ACROSS, &frames, WalkOptions::default());
+    walk.walk.twins.iter_mut().flat_map(|twin| &mut twin.steps).for_each(|step| step.frame += 2 * first);
+    walk
+}
+
+/// The same with a fit, of which this share of the outline found no edge.
+fn fitted(walk: TrackedWalk, missed: f64) -> TrackedWalk {
+    let frame = |row: &Row| FittedFrame {
+        torso_centre: row.torso_centre,
+        heading_rad: row.heading_rad,
+        along_m: 0.0,
+        phase: row.phase,
+        posture: row.posture,
+        measured: Default::default(),
+        sd: [0.01; 4],
     };
-    let path = Path { origin: DVec2::ZERO, heading_rad: 0.0 };
-    let walk = |ahead_m: f64, count: usize| followed(path, &frames(ahead_m, count), WalkOptions::default());
-    let (long, short) = (walk(-0.5, 30), walk(-0.45, 12));
-    assert!(short.is_double_of(&long) && !long.is_double_of(&short), "the long one stays");
-    assert!(!walk(0.0, 12).is_double_of(&long), "half a metre ahead");
-    let mut later = short.clone();
-    for step in later.walk.twins.iter_mut().flat_map(|twin| &mut twin.steps) {
-        step.frame += 100;
-    }
-    assert!(!later.is_double_of(&long));
+    let fit = WalkFit {
+        body: walk.walk.walker.body,
+        height: None,
+        route: walk.walk.route.clone(),
+        curves: std::array::from_fn(|_| vec![0.0; 50]),
+        frames: walk.rows().iter().map(frame).collect(),
+        contacts: Vec::new(),
+        p_swapped: 0.0,
+        mirrored: None,
+        belt: None,
+        quality: FitQuality {
+            residual_px: 0.5,
+            height_px: 200.0,
+            missed,
+            missed_inside: missed,
+            worst_length_sd: 1.0,
+            sole_m: None,
+            crown_off: None,
+            parts: [None; 14],
+        },
+    };
+    TrackedWalk { fit: Some(Ok(fit)), ..walk }
+}
+
+#[test]
+fn of_two_walks_whose_bodies_lie_on_each_other_the_shorter_one_is_a_double() {
+    let (long, short) = (beside(-0.5, 0, 30), beside(-0.45, 4, 12));
+    assert!(short.is_double_of(&long) && !long.is_double_of(&short));
+    assert!(!beside(0.0, 4, 12).is_double_of(&long), "half a metre ahead");
+    assert!(!beside(-0.45, 100, 12).is_double_of(&long), "later");
+    assert!(!beside(-0.45, 24, 16).is_double_of(&long), "common to both are six frames");
+}
+
+#[test]
+fn a_walk_that_fits_poorly_is_a_double_also_where_less_of_its_body_lies_on_another() {
+    let (poor, good) = (|walk| fitted(walk, 0.15), |walk| fitted(walk, 0.01));
+    let are = |a: &TrackedWalk, b: &TrackedWalk| [a.is_double_of(b), b.is_double_of(a)];
+    let (long, short, short_ahead) = (beside(-0.5, 0, 30), beside(-0.45, 4, 18), beside(-0.38, 4, 18));
+    assert_eq!(are(&good(long.clone()), &good(short_ahead.clone())), [false, false]);
+    assert_eq!(are(&poor(long.clone()), &poor(short_ahead.clone())), [false, false]);
+    assert_eq!(are(&good(long.clone()), &poor(short_ahead.clone())), [false, true]);
+    assert_eq!(are(&poor(long.clone()), &good(short_ahead)), [true, false], "most of the long one is common");
+    // Of a long one that is off at last, most is not common to both.
+    assert_eq!(are(&poor(beside(-0.5, 0, 50)), &good(short.clone())), [false, true]);
+    assert_eq!(are(&poor(long), &good(short)), [true, false]);
 }
