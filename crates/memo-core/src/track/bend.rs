@@ -48,8 +48,20 @@ impl Active {
             self.kept.drain(..self.kept.len().saturating_sub(longest));
         }
         if self.settled && self.steps().len().is_multiple_of(EVERY) {
-            self.bend(self.latest(options), When::Regularly, JERK_SD, options);
+            let (first, latest) = (self.latest(options), self.kept.len().saturating_sub(options.path_frames));
+            let has_turned = self.bend(first, When::Regularly, JERK_SD, options);
+            // Contours on a curve through all frames may tell less than those in the latest ones.
+            if !has_turned && first < latest && self.rectangles_turn(first) {
+                self.bend(latest, When::Regularly, JERK_SD, options);
+            }
         }
+    }
+
+    /// True if the rectangles of somebody on a straight path, from a kept frame on, turn clearly.
+    fn rectangles_turn(&self, from: usize) -> bool {
+        let sightings: Vec<Sighting> =
+            self.kept[from..].iter().filter_map(|(sighting, _)| *sighting).collect();
+        Trail::new(&[], &sightings, &self.camera, &self.crown()).turn_gain() > CLEAR_TURN
     }
 
     /// Looks for a turn when the walk seems to be over, also around a corner; true if it goes on around one.
