@@ -354,8 +354,7 @@ impl EvidenceStream {
         time_s: f64,
     ) -> Result<Option<Evidence>, EvidenceError> {
         let [low, firm] = &mut self.detectors;
-        let (low, firm) = rayon::join(|| low.push(frame), || firm.push(frame));
-        let masks = low?.zip(firm?);
+        let masks = low.push(frame)?.zip(firm.push(frame)?);
         let before = self.waiting.replace((number, time_s, frame.to_image()));
         self.evidence(before, masks, Some(frame))
     }
