@@ -264,3 +264,22 @@ def test_parameters_of_a_tsai_camera_lose_nothing():
     np.testing.assert_allclose(near.project(ground), camera.project(ground), atol=0.11)
     with pytest.raises(ValueError, match="camera: matrix is missing"):
         memo.Camera.from_parameters({"size": [640, 480]})
+
+
+def test_a_record_without_the_grid_along_the_path_is_explained_almost_alike(run, tmp_path, whys):
+    """Earlier versions did not record it: then hidden lines are those at the best position."""
+    walks = read_run(run)["walks"]
+    for walk in walks:
+        del walk["middle_along_m"], walk["alongs"]
+    chosen = [why.frame for why in whys[::10]]
+    earlier = list(explain(edited(run, tmp_path, walks=walks), chosen))
+    assert [why.frame for why in earlier] == chosen
+    off = [a.chosen_similarity - b.chosen_similarity for a, b in zip(earlier, whys[::10], strict=True)]
+    assert 0 < np.abs(off).max() < 0.02
+
+
+def test_half_a_grid_along_the_path_is_refused(run, tmp_path):
+    walks = read_run(run)["walks"]
+    del walks[0]["alongs"]
+    with pytest.raises(RunError, match="alongs: is missing, or middle_along_m is"):
+        list(explain(edited(run, tmp_path, walks=walks)))

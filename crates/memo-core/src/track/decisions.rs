@@ -99,7 +99,9 @@ pub(in crate::track) const EARLY_TURN_GAIN: f64 = 0.05;
 /// into the line of sight or out of it, who had 1.5 to 7.5 there, and on 20 who stood still for 2 to 4 s: 17 of these
 /// had up to 1.4, the others 1.9 and twice 4.2. So where a walk would be over, it does not decide alone: contours and
 /// rectangles together must be more likely on the curve. Of the 20 they were less likely by a factor of 1.6 and more. The
-/// margin was not measured on people on whom it was not chosen.
+/// margin was not measured on people on whom it was not chosen. Where they turn clearly in all frames of a straight path, a turn
+/// is also looked for in the latest ones: three drawn people who turned late had 4.7 to 37, 29 clips of straight walks up to
+/// 2.6, and the contours of those straight walks decide that they did not turn.
 pub(in crate::track) const CLEAR_TURN: f64 = 1.5;
 /// The same of the quick comparison, after which the frames are followed again.
 pub(in crate::track) const QUICK_TURN_GAIN: f64 = 0.008;

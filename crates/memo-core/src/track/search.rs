@@ -289,7 +289,7 @@ impl Grid {
 pub enum HiddenLines {
     /// Once for each phase and tile of positions, 16 cm along the path and all heights, in its middle; the visible
     /// pieces are then moved along, up and down. At a distance of 6 m the view turns by less than 1 degree to either
-    /// side, and the score changes by less than 1 %.
+    /// side, and the scores of a planted walker's grid change by less than 0.02.
     #[default]
     PerTile,
     /// For each hypothesis.
