@@ -2,10 +2,10 @@
 
 python benches/people.py SCENES [SCENE ...] [--rounds 5]
 
-SCENES has a folder per scene with `video.mp4` and `camera.toml`; without names, one, two and three people are
-tracked (`diagonal`, `cross2`, `three`). Videos are decoded before. Each round tracks every scene with the fits of
-the persons and without (`adapt=False`), so that load on the machine falls on all. The fastest round and the
-median are printed.
+SCENES has a folder per scene with `video.mp4` and `camera.toml`; without names, one, two and three
+people are tracked (`diagonal`, `cross2`, `three`). Videos are decoded before. Each round tracks every
+scene with the fits of the persons and without (`adapt=False`), so that load on the machine falls on all.
+The fastest round and the median are printed.
 """
 
 from __future__ import annotations
