@@ -5,11 +5,12 @@ import types
 import memo
 import numpy as np
 import pytest
-from conftest import grey_video, ran
+from conftest import SHARED_DATA, grey_video, ran
 from memo.explain import explain
 from memo.files import read_track_csv
 from memo.report import write_report
 from memo.turning import turned_deg, turning_words
+from memo.video import VideoReader
 
 
 def walk(*headings_deg, treadmill=None):
@@ -81,6 +82,19 @@ def test_who_turns_about_is_placed_by_route_and_body_together():
     columns = walk.columns
     off_m = [columns[name] - scene.truth[name][columns["frame"]] for name in ("x_m", "y_m")]
     assert len(columns["frame"]) > 90 and np.hypot(*off_m).max() < 0.08
+
+
+def test_who_goes_straight_in_clothes_like_the_background_stays_on_a_line():
+    """Followed from frame to frame, the contours are more similar on a slight bend."""
+    clip = SHARED_DATA / "walks" / "CMU02__clothes2"
+    if not clip.is_dir():
+        pytest.skip(f"no walk in {clip} (set MEMO_SHARED_DATA)")
+    with VideoReader(clip / "video.mp4") as reader:
+        frames = [frame.luma.copy() for frame in reader]
+    camera = memo.Camera.from_toml(clip / "camera.toml")
+    (walk,) = memo.track(frames, fps=25, camera=camera, height_m=1.84).walks
+    assert len(walk.columns["frame"]) > 60 and np.ptp(walk.columns["heading_rad"]) == 0
+    assert turning_words(walk) == ""
 
 
 def test_who_turns_into_the_line_of_sight_stays_one_walk():

@@ -45,7 +45,7 @@ use thiserror::Error;
 pub(crate) use headings::fit_on_the_spot;
 pub(crate) use problem::{FitFrame, Problem};
 pub use quality::{FitQuality, FitVerdict, PartQuality};
-pub(crate) use route::fitted_route;
+pub(crate) use route::{fitted_route, straightened};
 pub use unknowns::JOINTS;
 
 /// Options of the fit.

@@ -12,6 +12,7 @@ use super::edge_search::View;
 use super::views::{Backdrop, Piece};
 use super::{
     FitError, FitFrame, FitOptions, FitVerdict, FittedFrame, Problem, WalkFit, fit_on_the_spot, fitted_route,
+    straightened,
 };
 use crate::calibrate::TiltEstimate;
 use crate::estimate::kalman::FilterOptions;
@@ -26,6 +27,12 @@ const SEAM: usize = 8;
 /// of the feet, seconds. Chosen: with the difference added to all frames of the feet, two drawn people were 19 and 11
 /// instead of 7 and 9 cm off along the path, and one 4 instead of 8.
 const SEAM_S: f64 = 1.0;
+
+/// A slightly bent route is given up for a straight line unless the line costs more than this factor. Of 29 drawn people who
+/// went straight, the tracker bends the routes of four, by 1 to 5 degrees; the line costs them -4.2 to 1.6 % more. Of 22 people
+/// on routes of 20 to 69 degrees, 21 have 2.6 to 62 % more on a line; one, of 20 degrees, has 8 % less, with lengths of the body
+/// nearer to the average.
+const STRAIGHT: f64 = 1.02;
 
 /// A walk as it was tracked.
 #[derive(Debug, Clone, Copy)]
@@ -54,29 +61,51 @@ impl Tracked<'_> {
     ) -> Result<WalkFit, FitError> {
         let mut frames = self.frames(views);
         let ends_m = self.ends_m();
-        let route = &fitted_route(self.camera, self.average, &self.walk.route, ends_m, &mut frames, options);
-        let problem = |route| {
-            let problem = Problem::new(self.camera, self.average, route, &frames, options);
-            match self.height.source {
-                _ if self.tilt.is_some() => problem.of_assumed_camera(),
-                HeightSource::Given => problem,
-                _ => problem.of_height(self.height),
-            }
-        };
+        let route = fitted_route(self.camera, self.average, &self.walk.route, ends_m, &mut frames, options);
         let with_tilt = |mut fit: WalkFit| {
             self.tilt.iter().for_each(|tilt| fit.add_tilt(self.camera, tilt));
             fit
         };
         if !self.is_on_treadmill {
-            let mut fit = problem(route).fit(p_swapped)?;
-            if p_swapped.is_some() {
-                fit = self.with_height_of_its_own(fit, problem(route));
-            }
+            let bent = self.fit_over_ground(&route, &frames, options, p_swapped);
+            let fit = match straightened(&route, &mut frames) {
+                None => bent,
+                Some(line) => nearer(self.fit_over_ground(&line, &frames, options, p_swapped), bent),
+            };
+            let fit = fit?;
             return Ok(with_tilt(self.with_feet(fit)));
         }
+        let problem = |route| self.problem(route, &frames, options);
+        let route = &route;
         let mirrored = mirrored(&route.at(0.0), self.camera).into();
         let [here, there] = [route, &mirrored].map(|route| problem(route).on_treadmill());
         fit_on_the_spot(&here, &there, p_swapped).map(with_tilt)
+    }
+
+    fn problem<'a>(
+        &'a self,
+        route: &'a Route,
+        frames: &'a [FitFrame],
+        options: &'a FitOptions,
+    ) -> Problem<'a> {
+        let problem = Problem::new(self.camera, self.average, route, frames, options);
+        match self.height.source {
+            _ if self.tilt.is_some() => problem.of_assumed_camera(),
+            HeightSource::Given => problem,
+            _ => problem.of_height(self.height),
+        }
+    }
+
+    fn fit_over_ground(
+        &self,
+        route: &Route,
+        frames: &[FitFrame],
+        options: &FitOptions,
+        p_swapped: Option<f64>,
+    ) -> Result<WalkFit, FitError> {
+        let problem = || self.problem(route, frames, options);
+        let fit = problem().fit(p_swapped)?;
+        Ok(if p_swapped.is_some() { self.with_height_of_its_own(fit, problem()) } else { fit })
     }
 
     /// The same with the height that the picture shows if the given one is far from it: the fit near the given height
@@ -207,6 +236,15 @@ impl Tracked<'_> {
         };
         let contacts = fit.contacts.iter().copied().filter(is_shown).collect();
         WalkFit { frames, contacts, route, ..fit }
+    }
+}
+
+/// The fit on a straight line, unless that on a bent route is clearly nearer to the edges.
+fn nearer(line: Result<WalkFit, FitError>, bent: Result<WalkFit, FitError>) -> Result<WalkFit, FitError> {
+    match (&line, &bent) {
+        (Ok(on_line), Ok(on_bent)) if on_line.quality.cost > STRAIGHT * on_bent.quality.cost => bent,
+        (Err(_), _) => bent,
+        _ => line,
     }
 }
 

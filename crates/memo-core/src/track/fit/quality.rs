@@ -24,6 +24,9 @@ pub struct FitQuality {
     /// How far the moving region reaches above the head of the model, in the median of the frames, as a share of the
     /// person's height in the image; `None` if no frame shows the person alone.
     pub crown_off: Option<f64>,
+    /// Robust cost of the distances of all edges, which the fit makes least: of two fits to the same frames, the one that costs
+    /// less is nearer to the edges.
+    pub cost: f64,
     /// The outline of each part, in the order of [`Part::ALL`]; `None` of a part that is nowhere on the outline.
     pub parts: [Option<PartQuality>; PART_COUNT],
 }
@@ -132,6 +135,7 @@ mod tests {
         worst_length_sd: 1.0,
         sole_m: Some(0.01),
         crown_off: Some(0.004),
+        cost: 3000.0,
         parts: [Some(PartQuality { share: 1.0 / 14.0, missed: 0.01, residual_px: Some(0.7) }); PART_COUNT],
     };
 

@@ -359,6 +359,7 @@ fn fitted(walk: TrackedWalk, missed: f64) -> TrackedWalk {
             worst_length_sd: 1.0,
             sole_m: None,
             crown_off: None,
+            cost: 3000.0,
             parts: [None; 14],
         },
     };

@@ -37,6 +37,7 @@ impl Problem<'_> {
             worst_length_sd: lengths.fold(0.0, f64::max),
             sole_m: self.is_scale_seen.then(|| self.mean_sole_m(&fitted.unknowns)),
             crown_off: self.crown_off(&fitted.unknowns),
+            cost: seen.cost,
             parts: seen.parts.map(|of| {
                 let found = of.samples - of.missed;
                 (of.samples > 0.0).then(|| PartQuality {
