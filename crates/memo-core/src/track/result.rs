@@ -6,7 +6,7 @@
 //! the difference between the person's body and the model, and the distance.
 
 use super::crowd::body_box;
-use super::decisions::{ACROSS_SD_M, COMMON_PHASE_SD, SAME_BODY, SAME_BODY_OF_POOR};
+use super::decisions::{ACROSS_SD_M, COMMON_PHASE_SD, SAME_BODY, SAME_BODY_OF_POOR, WITHIN_BODY};
 use super::event::EventKind;
 use super::fit::contacts::Contact;
 use super::fit::{FitError, FitVerdict, FittedFrame, Measured, WalkFit};
@@ -189,13 +189,19 @@ impl TrackedWalk {
             return false;
         }
         let [own, others] = [self, other].map(Self::boxes);
-        let overlaps: Vec<f64> =
-            own.iter().filter_map(|(frame, sides)| Some(sides.overlap(others.get(frame)?))).collect();
-        let mean = overlaps.iter().sum::<f64>() / overlaps.len().max(1) as f64;
+        let common: Vec<[&Sides; 2]> =
+            own.iter().filter_map(|(frame, sides)| Some([sides, others.get(frame)?])).collect();
+        let mean = |overlap: fn(&Sides, &Sides) -> f64| {
+            common.iter().map(|[a, b]| overlap(a, b)).sum::<f64>() / common.len().max(1) as f64
+        };
         let is_off = [self.fits_poorly(), other.fits_poorly()];
-        let least = if is_off[0] == is_off[1] { SAME_BODY } else { SAME_BODY_OF_POOR };
-        let is_common = |frames: usize| 2 * overlaps.len() >= frames;
-        if mean <= least || !is_common(own.len().min(others.len())) {
+        let is_same = if is_off[0] == is_off[1] {
+            mean(Sides::overlap) > SAME_BODY
+        } else {
+            mean(Sides::overlap) > SAME_BODY_OF_POOR || mean(Sides::overlap_of_smaller) > WITHIN_BODY
+        };
+        let is_common = |frames: usize| 2 * common.len() >= frames;
+        if !is_same || !is_common(own.len().min(others.len())) {
             return false;
         }
         match is_off {

@@ -68,7 +68,11 @@ impl Tracked<'_> {
         };
         if !self.is_on_treadmill {
             let bent = self.fit_over_ground(&route, &frames, options, p_swapped);
-            let fit = match straightened(&route, &mut frames) {
+            // A walk goes on along its route, so only that of a whole walk is given up; and on the ground of an assumed
+            // camera a straight line may be bent.
+            let is_compared = p_swapped.is_some() && self.tilt.is_none();
+            let line = is_compared.then(|| straightened(&route, &mut frames)).flatten();
+            let fit = match line {
                 None => bent,
                 Some(line) => nearer(self.fit_over_ground(&line, &frames, options, p_swapped), bent),
             };

@@ -566,13 +566,10 @@ pub(super) struct Fitted {
 }
 
 /// An outline counts fully, a foot half, because shoes have edges of their own, and so do clothes inside the body.
-/// Below the sole is the foot's shadow, whose edge is not the sole's. The top of the thigh belongs to buttock and pelvis
-/// as much.
+/// The top of the thigh belongs to buttock and pelvis as much.
 fn importance(sample: &Sample) -> f64 {
     let row = row_of(sample.part);
-    let is_side_line = sample.radius != DVec3::ZERO;
     let of_border = match (sample.is_outer, row) {
-        (true, 7) if is_side_line && sample.normal.y > SOLE_DOWN => SOLE,
         (true, 7) => 0.5,
         (true, _) => 1.0,
         (false, _) => 0.25,
@@ -581,12 +578,6 @@ fn importance(sample: &Sample) -> f64 {
     let of_limb = if (2..=4).contains(&row) { 0.3 } else { 1.0 };
     of_limb * if is_top_of_thigh { 0.3 * of_border } else { of_border }
 }
-
-/// What the line of a sole counts, and how far down its normal in the image points at least. Chosen: oblique walks of people
-/// of tuning have knees of 3.6 degrees (root mean square error) instead of 3.8, contacts are 1 to 3 ms less early, and the
-/// other angles stay; with 0 people are 3 cm farther off.
-const SOLE: f64 = 0.15;
-const SOLE_DOWN: f64 = 0.5;
 
 /// The cost of an edge at a distance x, x² / (1 + x²), and the weight with which least squares lower it,
 /// 1 / (1 + x²)² (Geman and McClure, Bull Int Stat Inst 52:5, 1987).
