@@ -252,7 +252,7 @@ fn each<T, U>(items: &[T], value: impl Fn(&T) -> U) -> Vec<U> {
 }
 
 /// Maximum number of positions or heights of a grid; the tracker's own has at most 21.
-const MOST_VALUES: usize = 1000;
+const MOST_VALUES: usize = 100;
 /// Maximum number of samples of a curve; memo's own have fifty.
 const MOST_SAMPLES: usize = 10_000;
 
