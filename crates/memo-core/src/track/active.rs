@@ -1,5 +1,6 @@
 //! The current walk: whether it continues, its path, and the fit of the person at its end.
 
+use super::candidate::Seen;
 use super::crowd::{Expected, body_box, expected};
 use super::decisions::{
     DECIDING_SHARE, LONGEST_HIDDEN_S, LOST_SHARE, MOST_MISSED_TO_ADOPT, SLANT_GAIN, SLOWEST_HZ, SLOWEST_MPS,
@@ -24,6 +25,7 @@ use crate::model::body::PART_COUNT;
 use crate::model::{Camera, EllipticCylinder, Walker};
 use glam::DVec3;
 use std::collections::{BTreeMap, HashMap, HashSet};
+use std::sync::Arc;
 
 /// Somebody who moves faster over the last frames has left the treadmill, m/s.
 const LEAVING_MPS: f64 = 0.7;
@@ -94,6 +96,8 @@ pub(super) struct Active {
     pub(super) feet: BTreeMap<usize, Sighting>,
     /// What was seen before the walk started.
     pub(super) earlier: Standing,
+    /// What the regions of the frames before the start showed.
+    pub(super) before: Vec<Arc<Seen>>,
     /// What the feet show of somebody who walks towards the camera or away from it.
     pub(super) frontal: Option<Frontal>,
 }
@@ -506,6 +510,7 @@ pub(super) mod tests {
             early: None,
             feet: BTreeMap::new(),
             earlier: Standing::default(),
+            before: Vec::new(),
             frontal: None,
         }
     }

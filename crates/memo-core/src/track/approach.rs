@@ -47,6 +47,7 @@ impl Approach<'_> {
             pieces: standing.pieces,
             feet: standing.feet,
             earlier: Standing::default(),
+            before: Vec::new(),
             frontal: None,
         };
         active.kept = standing.kept;

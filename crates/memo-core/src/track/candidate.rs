@@ -152,6 +152,7 @@ impl Candidate {
             is_on_treadmill: false,
             feet: BTreeMap::new(),
             earlier: Standing::default(),
+            before: Vec::new(),
             frontal: None,
             early: None,
             pieces: self.seen.iter().filter_map(|seen| seen.piece.clone()).collect(),

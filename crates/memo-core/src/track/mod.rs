@@ -2,6 +2,7 @@
 
 mod active;
 mod approach;
+mod before;
 mod bend;
 mod candidate;
 mod crowd;

@@ -53,7 +53,8 @@ use crate::model::body::BodyError;
 use crate::model::{Body, Camera, EllipticCylinder};
 use glam::DVec2;
 use rayon::prelude::*;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
+use std::sync::Arc;
 use thiserror::Error;
 use unfollowed::{Moving, walk_boxes, with_small_ones};
 
@@ -147,6 +148,8 @@ pub struct Tracker {
     stream: EvidenceStream,
     backdrop: Backdrop,
     candidates: Vec<Candidate>,
+    /// What the regions of the latest frames showed.
+    sought: VecDeque<Arc<Seen>>,
     /// The regions of the last frame in which people seem to be side by side, and for how many frames they have been.
     side_by_side: Vec<(Rectangle, usize)>,
     /// Which of the given heights each person has, in order of appearance.
@@ -187,6 +190,7 @@ impl Tracker {
             stream,
             backdrop: Backdrop::default(),
             candidates: Vec::new(),
+            sought: VecDeque::new(),
             side_by_side: Vec::new(),
             order_of_heights,
             people: Vec::new(),
@@ -318,6 +322,7 @@ impl Tracker {
         }
         self.unfollowed.finish(self.options.start_frames);
         self.candidates.clear();
+        self.sought.clear();
         self.side_by_side.clear();
         self.standing = Standing::default();
         self.tilt = None;
@@ -595,8 +600,11 @@ impl Tracker {
         };
         let hindrances: Vec<Option<Hindrance>> = moving.regions.iter().map(&mut hinder).collect();
         self.notice(evidence, &moving, &hindrances);
+        let first = evidence.frame.saturating_sub(self.options.path_frames);
+        self.sought.retain(|seen| seen.edges.frame >= first);
         for sighting in sightings {
             let seen = self.seen(evidence, sighting)?;
+            self.sought.push_back(Arc::new(seen.clone()));
             let rectangle = &sighting.rectangle;
             let known = self.candidates.iter_mut().filter(|c| c.missed > 0 && c.is_at(rectangle));
             let nearest = known.max_by(|a, b| a.overlap(rectangle).total_cmp(&b.overlap(rectangle)));
@@ -734,6 +742,9 @@ impl Tracker {
                 Ok(mut active) => {
                     active.person = self.identified(&active);
                     active.started_near = !self.people.is_empty();
+                    let first = candidate.seen.first().map_or(0, |seen| seen.edges.frame);
+                    active.before =
+                        self.sought.iter().filter(|seen| seen.edges.frame < first).cloned().collect();
                     self.started.insert(active.person, evidence.frame);
                     self.people.push(active);
                 }
@@ -815,6 +826,7 @@ impl Tracker {
         active.settle(&self.backdrop, &self.options);
         // On a smoothed route, the feet would walk on.
         let standing = active.standing();
+        active.begin_before(&self.options);
         active.begin_earlier(&self.options);
         active.turned(&self.options);
         active.pace_all();

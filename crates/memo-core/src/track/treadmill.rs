@@ -130,6 +130,7 @@ impl Spot<'_> {
             is_on_treadmill: true,
             feet: standing.feet,
             earlier: Standing::default(),
+            before: Vec::new(),
             frontal: None,
             early: Some(self.backdrop.clone()),
         })

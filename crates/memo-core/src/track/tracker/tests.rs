@@ -306,6 +306,7 @@ fn following(count: usize, along_m: f64, speed_mps: f64) -> Tracker {
         early: None,
         feet: BTreeMap::new(),
         earlier: Standing::default(),
+        before: Vec::new(),
         frontal: None,
     });
     tracker

@@ -1,0 +1,230 @@
+//! The frames before a walk started in which the person was already walking.
+//!
+//! A walk starts on a region that is one person's for some frames. Before, the person may have been one region with somebody
+//! else, or a start may have been refused. Once the walk is over, body, route, speed and cadence are known:
+//!
+//! 1. What the regions of the frames before the start showed was kept.
+//! 2. From the start backwards, the person is searched in each near where the first steps lead, as long as the contours are
+//!    about as similar as in the walk.
+//! 3. From the earliest of these frames on, all are followed again.
+
+use super::active::Active;
+use super::candidate::{MISSED_FRAMES, Seen};
+use super::crowd::body_box;
+use super::decisions::LOST_SHARE;
+use super::fit::views::Piece;
+use super::options::TrackerOptions;
+use super::search::{Axis, Grid, Hypothesis, PHASE_STEP, POSITION_STEP_M, Scene, search_peak};
+use super::standing::Standing;
+use super::walk::{Beginning, State, Walk};
+use crate::estimate::line::line_through;
+use crate::model::Others;
+
+/// So much of what a frame's place and phase are off is expected in the frame before.
+const DRIFT: f64 = 0.5;
+/// Half width of the search in steps of the grid.
+const STEPS: f64 = 3.0;
+/// So much of the body's height and width must be in the window in which edges were searched.
+const LEAST_IN_WINDOW: f64 = 0.95;
+/// The frames of the walk may become less similar by this share.
+const MOST_LOST: f64 = 0.01;
+
+impl Active {
+    /// Begins the walk with the frames before it in which the contours show it too.
+    pub(super) fn begin_before(&mut self, options: &TrackerOptions) {
+        let before = std::mem::take(&mut self.before);
+        let is_whole = self.kept.len() == self.steps().len();
+        if before.is_empty() || self.is_on_treadmill || self.frontal.is_some() || !is_whole {
+            return;
+        }
+        // 1. Where the first steps lead.
+        let first = &self.steps()[..self.steps().len().min(2 * options.start_frames)];
+        let line = |of: fn(&State) -> f64| {
+            line_through(&first.iter().map(|step| (step.time_s, of(&step.state))).collect::<Vec<_>>())
+        };
+        let (speed_mps, along_m) = line(|state| state.along.position);
+        let (rate_hz, phase) = line(|state| state.phase.position);
+        let height_m = first.iter().map(|step| step.state.height.position).sum::<f64>() / first.len() as f64;
+        let found = |similarity: f32, visible: f32| f64::from(similarity * visible);
+        let sum = |walk: &Walk, from: usize| -> f64 {
+            let steps = &walk.twins[walk.best()].steps[from..];
+            steps.iter().map(|step| found(step.similarity, step.visible)).sum()
+        };
+        let least = LOST_SHARE * sum(&self.walk, 0) / self.steps().len() as f64;
+        // 2. The frames that show the person there, the latest first.
+        let [mut along_off, mut phase_off] = [0.0; 2];
+        let mut added: Vec<&Seen> = Vec::new();
+        let mut beginning = None;
+        let mut missed = 0;
+        for regions in before.chunk_by(|a, b| a.edges.frame == b.edges.frame).rev() {
+            let time_s = regions[0].edges.time_s;
+            let led = Hypothesis {
+                along_m: along_m + speed_mps * time_s + along_off,
+                height_m,
+                phase: phase + rate_hz * time_s + phase_off,
+            };
+            let found = regions.iter().filter_map(|seen| Some((seen, self.similar(&led, seen, options)?)));
+            let most = found.max_by(|(_, a), (_, b)| a.1.total_cmp(&b.1));
+            let Some((seen, (best, _))) = most.filter(|(_, (_, similarity))| *similarity >= least) else {
+                missed += 1;
+                if missed > MISSED_FRAMES {
+                    break;
+                }
+                continue;
+            };
+            let cycles = best.phase - led.phase;
+            along_off += DRIFT * (best.along_m - led.along_m);
+            phase_off += DRIFT * (cycles - cycles.round());
+            missed = 0;
+            added.push(seen);
+            beginning =
+                Some(Beginning { time_s, along_m: led.along_m, phase: led.phase, speed_mps, rate_hz });
+        }
+        let Some(beginning) = beginning else { return };
+        added.reverse();
+        // 3. All frames from there on.
+        let mut walk = Walk::new(self.walk.walker.clone(), self.walk.route.clone(), beginning);
+        for edges in added.iter().map(|seen| &seen.edges).chain(self.kept.iter().map(|(_, edges)| edges)) {
+            walk.follow(edges, &self.camera, &options.walk);
+        }
+        if sum(&walk, added.len()) < (1.0 - MOST_LOST) * sum(&self.walk, 0) {
+            return;
+        }
+        self.walk = walk;
+        self.earlier = Standing::default();
+        self.kept.splice(0..0, added.iter().map(|seen| (None, seen.edges.clone())));
+        // The crown of a region may be somebody else's.
+        let pieces = added.iter().filter_map(|seen| Some(Piece { crown_px: None, ..seen.piece.clone()? }));
+        self.pieces.splice(0..0, pieces.collect::<Vec<_>>());
+    }
+
+    /// The most similar hypothesis near one, and its similarity; `None` if the edges of the body were not searched.
+    fn similar(&self, near: &Hypothesis, seen: &Seen, options: &TrackerOptions) -> Option<(Hypothesis, f64)> {
+        let near = Hypothesis { phase: near.phase.rem_euclid(1.0), ..*near };
+        let others = Others::new(&seen.edges.others, self.camera.position());
+        let path = self.walk.route.at(near.along_m);
+        let scene = Scene::new(&self.walk.walker, &self.camera, &path).among(&others);
+        let [low, high] = body_box(&self.camera, &scene.pose(&near).cylinders)?;
+        let window = seen.edges.window.sides(0.0);
+        let inside = |low: f64, high: f64, from: f64, to: f64| (high.min(to) - low.max(from)) / (high - low);
+        let across = inside(low.x, high.x, window.left, window.right);
+        let along = inside(low.y, high.y, window.top, window.bottom);
+        if across.min(along) < LEAST_IN_WINDOW {
+            return None;
+        }
+        let grid = Grid {
+            along: Axis::around(near.along_m, STEPS * POSITION_STEP_M, POSITION_STEP_M),
+            height: Axis::around(near.height_m, STEPS * POSITION_STEP_M, POSITION_STEP_M),
+            phase: Axis::around(near.phase, STEPS * PHASE_STEP, PHASE_STEP),
+        };
+        let (similarity, hidden_lines) = (&options.walk.similarity, options.walk.hidden_lines);
+        let found = search_peak(&seen.edges.edges, &scene, &grid, similarity, hidden_lines);
+        let visible = scene.visible_share(&near);
+        Some((found.best(), f64::from(found.best_score() * visible)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::active::tests::{BEGINNING, PATH, active, frames_on, options};
+    use super::super::walk::FrameEdges;
+    use super::*;
+    use std::sync::Arc;
+
+    const FRAME_S: f64 = 0.05;
+    const FIRST: usize = 20;
+
+    /// A walk along a path that is followed from the frame `FIRST` on, and what was seen before.
+    fn begun() -> Active {
+        let mut frames = frames_on(60, FRAME_S, &PATH.into(), &PATH.into());
+        let kept = frames.split_off(FIRST);
+        let mut active = active(Vec::new());
+        let time_s = kept[0].1.time_s;
+        let beginning = Beginning {
+            time_s,
+            along_m: BEGINNING.along_m + BEGINNING.speed_mps * time_s,
+            phase: BEGINNING.phase + BEGINNING.rate_hz * time_s,
+            ..BEGINNING
+        };
+        active.walk = Walk::new(active.walk.walker.clone(), PATH, beginning);
+        for (_, edges) in &kept {
+            active.walk.follow(edges, &active.camera, &options().walk);
+        }
+        active.kept = kept;
+        let seen = |(sighting, edges): (Option<_>, FrameEdges)| Seen {
+            sighting: sighting.unwrap(),
+            edges,
+            piece: None,
+        };
+        active.before = frames.into_iter().map(|frame| Arc::new(seen(frame))).collect();
+        active
+    }
+
+    fn first_frame(mut active: Active) -> usize {
+        active.begin_before(&options());
+        let steps = active.steps();
+        assert_eq!(steps.len(), active.kept.len());
+        for (step, (_, edges)) in steps.iter().zip(&active.kept) {
+            assert_eq!(step.frame, edges.frame);
+            let along_m = BEGINNING.along_m + BEGINNING.speed_mps * step.time_s;
+            let cycles = step.state.phase.position - BEGINNING.phase - BEGINNING.rate_hz * step.time_s;
+            assert!((step.state.along.position - along_m).abs() < 0.03, "{}: {:?}", step.frame, step.state);
+            assert!((cycles - cycles.round()).abs() < 0.03, "{}: {cycles}", step.frame);
+        }
+        steps[0].frame
+    }
+
+    /// Without the edges of a region in some frames.
+    fn without(active: &mut Active, frames: std::ops::Range<usize>) {
+        for seen in &mut active.before[frames] {
+            Arc::make_mut(seen).edges.edges.clear();
+        }
+    }
+
+    #[test]
+    fn a_walk_begins_with_the_first_frame_that_shows_it() {
+        assert_eq!(first_frame(begun()), 0);
+        let mut late = begun();
+        without(&mut late, 0..6);
+        assert_eq!(first_frame(late), 6);
+        let mut gap = begun();
+        without(&mut gap, 8..8 + MISSED_FRAMES);
+        assert_eq!(first_frame(gap), 0, "over a short gap");
+        let mut lost = begun();
+        without(&mut lost, 8..9 + MISSED_FRAMES);
+        assert_eq!(first_frame(lost), 9 + MISSED_FRAMES);
+    }
+
+    /// Of several regions in a frame, the one with the person counts; a window that cuts the body shows too little.
+    #[test]
+    fn the_region_with_the_person_is_looked_at() {
+        let mut beside = begun();
+        let other = |seen: &Arc<Seen>| {
+            let mut other = Seen::clone(seen);
+            other.edges.edges.clear();
+            Arc::new(other)
+        };
+        beside.before = beside.before.iter().flat_map(|seen| [other(seen), seen.clone()]).collect();
+        assert_eq!(first_frame(beside), 0);
+        let mut cut = begun();
+        for seen in &mut cut.before[..10] {
+            let seen = Arc::make_mut(seen);
+            seen.edges.window.bottom = seen.sighting.rectangle.bottom - seen.sighting.rectangle.height() / 5;
+        }
+        assert_eq!(first_frame(cut), 10);
+    }
+
+    #[test]
+    fn who_is_followed_by_the_feet_or_walks_on_the_spot_begins_as_before() {
+        let mut on_the_spot = begun();
+        on_the_spot.is_on_treadmill = true;
+        assert_eq!(first_frame(on_the_spot), FIRST);
+        let mut nothing = begun();
+        nothing.before.clear();
+        assert_eq!(first_frame(nothing), FIRST);
+        let mut thinned = begun();
+        thinned.kept.drain(..3);
+        thinned.begin_before(&options());
+        assert_eq!(thinned.steps()[0].frame, FIRST, "the first frames are gone");
+    }
+}
