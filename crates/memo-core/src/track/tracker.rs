@@ -740,11 +740,14 @@ impl Tracker {
             });
             match begun {
                 Ok(mut active) => {
+                    let known = self.identities.count();
                     active.person = self.identified(&active);
                     active.started_near = !self.people.is_empty();
-                    let first = candidate.seen.first().map_or(0, |seen| seen.edges.frame);
-                    active.before =
-                        self.sought.iter().filter(|seen| seen.edges.frame < first).cloned().collect();
+                    active.before = self.before(&candidate);
+                    // In the frames before somebody is back, there may be the earlier walk.
+                    if active.person < known {
+                        active.before.clear();
+                    }
                     self.started.insert(active.person, evidence.frame);
                     self.people.push(active);
                 }
@@ -758,6 +761,12 @@ impl Tracker {
                 }
             }
         }
+    }
+
+    /// What the regions of the frames before those of a candidate showed.
+    fn before(&self, candidate: &Candidate) -> Vec<Arc<Seen>> {
+        let first = candidate.seen.first().map_or(0, |seen| seen.edges.frame);
+        self.sought.iter().filter(|seen| seen.edges.frame < first).cloned().collect()
     }
 
     /// The given height of a person; `None` if it is to be measured.
