@@ -1,5 +1,6 @@
 """Several people in one video: the whole chain on drawn people who cross, told apart by `person`."""
 
+import memo
 import numpy as np
 import pytest
 from conftest import SHARED_DATA, ran
@@ -52,3 +53,23 @@ def test_everybody_in_a_frame_is_explained(run):
         assert np.linalg.norm(middle_px - hips_px) < 40
     page = write_report(run, frames=(chosen[0], chosen[0] + 3)).path.read_text(encoding="utf-8")
     assert "Walk 2 (person 2): value" in page and "Heel strikes and toe-offs of person 2" in page
+
+
+def test_two_who_come_as_one_region_are_measured_from_where_they_came():
+    """A drawn person and a copy 70 pixels beside, whose walks start 12 and 36 frames later."""
+    scene = memo.demo_scene(4, frames=60)
+    frames = np.stack([np.asarray(frame) for frame in scene.frames]).astype(np.int16)
+    empty = np.median(frames, axis=0).astype(np.int16)
+    changed = np.abs(frames - empty) > 10
+    beside, also_changed = (np.roll(pixels, -70, axis=2) for pixels in (frames, changed))
+    both = np.where(changed, frames, np.where(also_changed, beside, empty)).astype(np.uint8)
+    walks = memo.track(list(both), fps=25, camera=scene.camera, height_m=scene.height_m).walks
+    assert len(walks) == 2
+    off_m = []
+    for columns in (walk.columns for walk in walks):
+        assert columns["frame"][0] <= 4 and len(columns["frame"]) >= 54
+        off_m.append(columns["x_m"] - scene.truth["x_m"][columns["frame"]])
+    original, copy = sorted(off_m, key=lambda off: np.abs(np.median(off)))
+    assert np.abs(original).max() < 0.05
+    # Where the copy is seen, 70 pixels beside: at the same distance from it all the way.
+    assert np.abs(copy - np.median(copy)).max() < 0.06
