@@ -45,10 +45,9 @@ impl Active {
         let (speed_mps, along_m) = line(|state| state.along.position);
         let (rate_hz, phase) = line(|state| state.phase.position);
         let height_m = first.iter().map(|step| step.state.height.position).sum::<f64>() / first.len() as f64;
-        let found = |similarity: f32, visible: f32| f64::from(similarity * visible);
         let sum = |walk: &Walk, from: usize| -> f64 {
             let steps = &walk.twins[walk.best()].steps[from..];
-            steps.iter().map(|step| found(step.similarity, step.visible)).sum()
+            steps.iter().map(|step| f64::from(step.similarity * step.visible)).sum()
         };
         let least = LOST_SHARE * sum(&self.walk, 0) / self.steps().len() as f64;
         // 2. The frames that show the person there, the latest first.

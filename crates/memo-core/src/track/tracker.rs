@@ -53,7 +53,7 @@ use crate::model::body::BodyError;
 use crate::model::{Body, Camera, EllipticCylinder};
 use glam::DVec2;
 use rayon::prelude::*;
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use thiserror::Error;
 use unfollowed::{Moving, walk_boxes, with_small_ones};
@@ -149,7 +149,7 @@ pub struct Tracker {
     backdrop: Backdrop,
     candidates: Vec<Candidate>,
     /// What the regions of the latest frames showed.
-    sought: VecDeque<Arc<Seen>>,
+    sought: Vec<Arc<Seen>>,
     /// The regions of the last frame in which people seem to be side by side, and for how many frames they have been.
     side_by_side: Vec<(Rectangle, usize)>,
     /// Which of the given heights each person has, in order of appearance.
@@ -190,7 +190,7 @@ impl Tracker {
             stream,
             backdrop: Backdrop::default(),
             candidates: Vec::new(),
-            sought: VecDeque::new(),
+            sought: Vec::new(),
             side_by_side: Vec::new(),
             order_of_heights,
             people: Vec::new(),
@@ -604,7 +604,7 @@ impl Tracker {
         self.sought.retain(|seen| seen.edges.frame >= first);
         for sighting in sightings {
             let seen = self.seen(evidence, sighting)?;
-            self.sought.push_back(Arc::new(seen.clone()));
+            self.sought.push(Arc::new(seen.clone()));
             let rectangle = &sighting.rectangle;
             let known = self.candidates.iter_mut().filter(|c| c.missed > 0 && c.is_at(rectangle));
             let nearest = known.max_by(|a, b| a.overlap(rectangle).total_cmp(&b.overlap(rectangle)));
