@@ -640,8 +640,8 @@ pub(super) mod tests {
         walk.walk.twins[0].steps.iter_mut().for_each(|step| step.visible = step.frame as f32 / 64.0);
         let view = View {
             corner: [0, 0],
-            grey: Image::filled(1, 1, 0),
-            background: None,
+            pixels: Image::filled(1, 1, [0; 2]),
+            is_empty_known: false,
             others: Vec::new(),
             crown_px: None,
         };

@@ -15,10 +15,10 @@ use glam::DVec2;
 pub struct View {
     /// Column and row of its first pixel in the image.
     pub corner: [usize; 2],
-    /// The frame's grey values.
-    pub grey: Image<u8>,
-    /// Those of the empty scene, of the same size; `None` if it was never seen.
-    pub background: Option<Image<u8>>,
+    /// Grey values of the frame and of the empty scene, side by side because they are read together.
+    pub pixels: Image<[u8; 2]>,
+    /// False if the empty scene was never seen.
+    pub is_empty_known: bool,
     /// The bodies of other people near it.
     pub others: Vec<EllipticCylinder>,
     /// Row of the crown by the changes, pixels; `None` where they do not show the person alone.
@@ -69,6 +69,9 @@ const ROUNDING_PX: f64 = 1e-6;
 /// Working memory of a search.
 #[derive(Debug, Default)]
 pub struct Profile {
+    /// The four pixels about each sample, two in a row, and where it lies between them.
+    pixels: [Vec<u32>; 2],
+    between: [Vec<u32>; 2],
     grey: Vec<f32>,
     /// Absolute difference from the empty scene.
     unlike: Vec<f32>,
@@ -76,6 +79,16 @@ pub struct Profile {
 }
 
 impl View {
+    /// The grey values of a piece beside those of the empty scene, of which the same part of a row is given.
+    pub fn paired<'a>(grey: &Image<u8>, empty_row: impl Fn(usize) -> &'a [u8]) -> Image<[u8; 2]> {
+        let mut pixels = Image::filled(grey.width(), grey.height(), [0; 2]);
+        for y in 0..grey.height() {
+            let both = grey.row(y).iter().zip(empty_row(y));
+            pixels.row_mut(y).iter_mut().zip(both).for_each(|(pair, (&grey, &empty))| *pair = [grey, empty]);
+        }
+        pixels
+    }
+
     /// The strongest and nearest edge within reach of a point, along a unit normal that points outwards; `None`
     /// if the normal leaves the piece.
     pub fn search(
@@ -88,46 +101,29 @@ impl View {
     ) -> Option<FoundEdge> {
         let near = &reach.near[..];
         let middle = near.len() / 2;
-        let background = self.background.as_ref().filter(|_| border == Border::Outer);
         // 1. The samples along the normal. They are inside if the first and the last are.
         let corner = DVec2::new(self.corner[0] as f64, self.corner[1] as f64);
         let most = (middle + SAMPLES) as f64;
         let ends = [-most, most].map(|offset| point + normal * offset - corner);
-        let last = DVec2::new(self.grey.width() as f64, self.grey.height() as f64) - 1.0 - ROUNDING_PX;
+        let last = DVec2::new(self.pixels.width() as f64, self.pixels.height() as f64) - 1.0 - ROUNDING_PX;
         let is_inside = |end: &DVec2| end.cmpge(DVec2::splat(ROUNDING_PX)).all() && end.cmple(last).all();
         if !ends.iter().all(is_inside) {
             return None;
         }
-        let places = FixedPoint::line(ends[0], normal);
-        let (width, grey) = (self.grey.width(), self.grey.pixels());
-        let count = near.len() + 2 * SAMPLES;
-        profile.grey.resize(count, 0.0);
-        match background {
-            None => profile.grey.iter_mut().zip(places).for_each(|(at, place)| *at = place.of(grey, width)),
-            Some(behind) => {
-                debug_assert_eq!(behind.width(), width);
-                let behind = &behind.pixels()[..grey.len()];
-                profile.unlike.resize(count, 0.0);
-                let profile = profile.grey.iter_mut().zip(&mut profile.unlike);
-                for ((at, unlike), place) in profile.zip(places) {
-                    *at = place.of(grey, width);
-                    *unlike = (*at - place.of(behind, width)).abs();
-                }
-            }
-        }
+        profile.read(&self.pixels, ends[0], normal, near.len() + 2 * SAMPLES);
         // 2. The step at each of them.
+        let (grey, unlike) = (&profile.grey[..], &profile.unlike[..]);
         let fall = |w: &[f32]| (w[0] + w[1] - w[3] - w[4]) / SAMPLES as f32;
-        let of_grey = profile.grey.windows(2 * SAMPLES + 1).map(fall);
-        profile.steps.clear();
-        if background.is_some() {
-            let of_unlike = profile.unlike.windows(2 * SAMPLES + 1).map(fall);
-            let both = of_grey.zip(of_unlike).map(|(grey, unlike)| (unlike.max(0.0) * grey.abs()).sqrt());
-            profile.steps.extend(both);
+        let of_grey = grey.windows(2 * SAMPLES + 1).map(|w| fall(w).abs());
+        profile.steps.resize(near.len(), 0.0);
+        let steps = &mut profile.steps[..];
+        if self.is_empty_known && border == Border::Outer {
+            let both = of_grey.zip(unlike.windows(2 * SAMPLES + 1));
+            steps.iter_mut().zip(both).for_each(|(step, (grey, w))| *step = (fall(w).max(0.0) * grey).sqrt());
         } else {
-            profile.steps.extend(of_grey.map(f32::abs));
+            steps.iter_mut().zip(of_grey).for_each(|(step, grey)| *step = grey);
         }
         // 3. The strongest, the less the farther it is.
-        let steps = &profile.steps[..];
         let mut best = (0.0, middle);
         for (n, (step, near)) in steps.iter().zip(near).enumerate() {
             if step * near > best.0 {
@@ -148,33 +144,47 @@ impl View {
     }
 }
 
-/// A place between pixels, column and row in units of 2^-32 pixels: integers are faster to move and to split than
-/// floating-point numbers.
-#[derive(Clone, Copy)]
-struct FixedPoint([i64; 2]);
-
-impl FixedPoint {
-    /// The places from the first on, one step apart.
-    #[inline(always)]
-    fn line(first: DVec2, step: DVec2) -> impl Iterator<Item = Self> {
+impl Profile {
+    /// The samples from a point inside the pixels on, one step apart. Loads come before arithmetic, which the compiler
+    /// vectorises without them.
+    fn read(&mut self, pixels: &Image<[u8; 2]>, first: DVec2, step: DVec2, count: usize) {
+        self.pixels.iter_mut().chain(&mut self.between).for_each(|words| words.resize(count, 0));
+        [&mut self.grey, &mut self.unlike].into_iter().for_each(|samples| samples.resize(count, 0.0));
+        let (width, pixels) = (pixels.width(), pixels.pixels());
+        let [above, below] = self.pixels.each_mut().map(|words| &mut words[..count]);
+        let [right, down] = self.between.each_mut().map(|words| &mut words[..count]);
+        // Columns and rows in units of 2^-32 pixels: integers are faster to move and to split than floating-point numbers.
         let fixed = |v: DVec2| [v.x, v.y].map(|x| (x * (1i64 << 32) as f64) as i64);
-        let (first, step) = (fixed(first), fixed(step));
-        (0..).map(move |n| Self([first[0] + n * step[0], first[1] + n * step[1]]))
-    }
-
-    /// The grey value there, linear along both axes, of an image whose rows have `width` pixels.
-    #[inline(always)]
-    fn of(self, pixels: &[u8], width: usize) -> f32 {
-        let [x, y] = self.0.map(|x| (x >> 32) as usize);
-        let [right, down] = self.0.map(|x| (x as u32 >> 8) as f32 / (1 << 24) as f32);
+        let ([x0, y0], [dx, dy]) = (fixed(first), fixed(step));
         let pair = |at: usize| {
             let pixels = &pixels[at..at + 2];
-            [f32::from(pixels[0]), f32::from(pixels[1])]
+            let ([a, b], [c, d]) = (pixels[0], pixels[1]);
+            u32::from_le_bytes([a, b, c, d])
         };
-        let at = y * width + x;
-        let ([a, b], [c, d]) = (pair(at), pair(at + width));
-        let (above, below) = (a + right * (b - a), c + right * (d - c));
-        above + down * (below - above)
+        for n in 0..count {
+            let (x, y) = (x0 + n as i64 * dx, y0 + n as i64 * dy);
+            let at = (y >> 32) as usize * width + (x >> 32) as usize;
+            (above[n], below[n]) = (pair(at), pair(at + width));
+            (right[n], down[n]) = (x as u32, y as u32);
+        }
+        // Linear along both axes.
+        let (grey, unlike) = (&mut self.grey[..count], &mut self.unlike[..count]);
+        for n in 0..count {
+            let share = |word: u32| (word >> 8) as i32 as f32 / (1 << 24) as f32;
+            let byte = |word: u32, n: u32| (word >> (8 * n) & 0xff) as i32 as f32;
+            let (right, down) = (share(right[n]), share(down[n]));
+            let value = |of: u32| {
+                let across = |word: u32| {
+                    let (left, after) = (byte(word, of), byte(word, of + 2));
+                    left + right * (after - left)
+                };
+                let (above, below) = (across(above[n]), across(below[n]));
+                above + down * (below - above)
+            };
+            let (seen, behind) = (value(0), value(1));
+            grey[n] = seen;
+            unlike[n] = (seen - behind).abs();
+        }
     }
 }
 
@@ -185,14 +195,12 @@ mod tests {
     /// Grey 200 left of column 30.5, 100 right of it, before an empty scene of `behind`, of which columns 40 to 44
     /// have a stripe that the frame shows too.
     fn view(behind: u8) -> View {
-        let mut grey = Image::filled(60, 40, 100u8);
-        let mut background = Image::filled(60, 40, behind);
+        let mut pixels = Image::filled(60, 40, [100, behind]);
         for y in 0..40 {
-            grey.row_mut(y)[..31].fill(200);
-            grey.row_mut(y)[40..45].fill(20);
-            background.row_mut(y)[40..45].fill(20);
+            pixels.row_mut(y)[..31].fill([200, behind]);
+            pixels.row_mut(y)[40..45].fill([20, 20]);
         }
-        View { corner: [100, 50], grey, background: Some(background), others: Vec::new(), crown_px: None }
+        View { corner: [100, 50], pixels, is_empty_known: true, others: Vec::new(), crown_px: None }
     }
 
     fn found(view: &View, x: f64, border: Border) -> FoundEdge {
@@ -230,7 +238,7 @@ mod tests {
 
     #[test]
     fn where_the_empty_scene_was_never_seen_every_step_may_be_an_outline() {
-        let alone = View { background: None, ..view(100) };
+        let alone = View { is_empty_known: false, ..view(100) };
         for x in [28.0, 33.2] {
             let edge = found(&alone, x, Border::Outer);
             assert!((x + edge.offset_px - 30.5).abs() < 0.3, "{edge:?} from {x}");
@@ -240,15 +248,24 @@ mod tests {
 
     #[test]
     fn places_between_pixels_are_read_as_in_floating_point() {
-        let mut image = Image::filled(7, 5, 0u8);
+        let mut pixels = Image::filled(7, 5, [0u8; 2]);
         for y in 0..5 {
-            (0..7).for_each(|x| image.row_mut(y)[x] = ((31 * x + 57 * y) % 256) as u8);
+            (0..7).for_each(|x| pixels.row_mut(y)[x] = [31, 83].map(|k| ((k * x + 57 * y) % 256) as u8));
         }
+        let [grey, empty] = [0, 1].map(|k| {
+            let mut image = Image::filled(7, 5, 0u8);
+            (0..5).for_each(|y| (0..7).for_each(|x| image.row_mut(y)[x] = pixels.row(y)[x][k]));
+            image
+        });
         let (first, step) = (DVec2::new(0.3, 3.9), DVec2::new(0.41, -0.29));
-        for (n, place) in FixedPoint::line(first, step).take(14).enumerate() {
-            let wanted = image.as_frame().between(first + step * n as f64).unwrap();
-            let read = place.of(image.pixels(), image.width());
-            assert!((f64::from(read) - wanted).abs() < 1e-4, "{n}: {read} against {wanted}");
+        let mut profile = Profile::default();
+        profile.read(&pixels, first, step, 14);
+        for n in 0..14 {
+            let [seen, behind] =
+                [&grey, &empty].map(|image| image.as_frame().between(first + step * n as f64).unwrap());
+            let (read, unlike) = (f64::from(profile.grey[n]), f64::from(profile.unlike[n]));
+            assert!((read - seen).abs() < 1e-4, "{n}: {read} against {seen}");
+            assert!((unlike - (seen - behind).abs()).abs() < 1e-4, "{n}: {unlike} against {seen}, {behind}");
         }
     }
 

@@ -67,11 +67,11 @@ impl Piece {
 
     /// The piece before an empty scene that is as large as the frames.
     pub fn before(self, empty: &Image<u8>) -> View {
-        let background = Some(cut(empty, &self.kept));
+        let kept = self.kept;
         View {
-            corner: [self.kept.left, self.kept.top],
-            grey: self.grey,
-            background,
+            corner: [kept.left, kept.top],
+            pixels: View::paired(&self.grey, |y| &empty.row(kept.top + y)[kept.left..=kept.right]),
+            is_empty_known: true,
             others: self.others,
             crown_px: self.crown_px,
         }
@@ -126,8 +126,8 @@ impl Backdrop {
         }
         let alone = |p: &Piece| View {
             corner: [p.kept.left, p.kept.top],
-            grey: p.grey.clone(),
-            background: None,
+            pixels: View::paired(&p.grey, |y| p.grey.row(y)),
+            is_empty_known: false,
             others: p.others.clone(),
             crown_px: None,
         };
@@ -141,15 +141,12 @@ impl Backdrop {
             (whole.top..=whole.bottom).into_par_iter().map(|y| self.empty_row(y, &whole, least)).collect();
         let behind = |piece: &Piece| {
             let kept = piece.kept;
-            let mut background = Image::filled(kept.width(), kept.height(), 0);
-            for y in 0..kept.height() {
-                let row = &rows[kept.top - whole.top + y];
-                background.row_mut(y).copy_from_slice(&row[kept.left - whole.left..=kept.right - whole.left]);
-            }
+            let columns = kept.left - whole.left..=kept.right - whole.left;
+            let empty_row = |y: usize| &rows[kept.top - whole.top + y][columns.clone()];
             View {
                 corner: [kept.left, kept.top],
-                grey: piece.grey.clone(),
-                background: Some(background),
+                pixels: View::paired(&piece.grey, empty_row),
+                is_empty_known: true,
                 others: piece.others.clone(),
                 crown_px: piece.crown_px,
             }
@@ -226,12 +223,14 @@ mod tests {
             assert_eq!(views.len(), frames);
             let mut wrong = 0;
             for (view, piece) in views.iter().zip(&pieces) {
-                assert_eq!((view.corner, &view.grey), ([piece.kept.left, piece.kept.top], &piece.grey));
-                let background = view.background.as_ref().unwrap();
-                for y in 0..background.height() {
+                assert_eq!((view.corner, view.is_empty_known), ([piece.kept.left, piece.kept.top], true));
+                assert!(
+                    view.pixels.pixels().iter().zip(piece.grey.pixels()).all(|(pair, grey)| pair[0] == *grey)
+                );
+                for y in 0..view.pixels.height() {
                     let expected = |x: usize| (40 + 10 * ((x + piece.kept.left) / 8 % 3)) as u8;
-                    let row = background.row(y).iter().enumerate();
-                    wrong += row.filter(|(x, v)| **v != expected(*x)).count();
+                    let row = view.pixels.row(y).iter().enumerate();
+                    wrong += row.filter(|(x, pair)| pair[1] != expected(*x)).count();
                 }
             }
             // In eight frames the box hardly leaves its place: columns that it always covers stay unknown.
@@ -247,16 +246,18 @@ mod tests {
         (2..8).for_each(|k| backdrop.occupy(k, place));
         let walk: Vec<Piece> = (2..8).map(|k| Piece::new(k, &frame(k), place, Vec::new())).collect();
         let views = backdrop.views_on_the_spot(walk.iter());
-        assert!(views.iter().all(|view| view.background.is_some()));
+        assert!(views.iter().all(|view| view.is_empty_known));
         // The two frames before the walk show the box farther left; right of it the scene is empty.
-        let (background, corner) = (views[0].background.as_ref().unwrap(), views[0].corner);
+        let View { pixels, corner, .. } = &views[0];
         let grey = |x: usize| (40 + 10 * (x / 8 % 3)) as u8;
-        assert!((40..50).all(|x| background.at(x - corner[0], 20 - corner[1]) == grey(x)));
+        assert!((40..50).all(|x| pixels.row(20 - corner[1])[x - corner[0]][1] == grey(x)));
         let mut always = Backdrop::default();
         (2..8).for_each(|k| always.push(k, &frame(k)));
         let views = always.views_on_the_spot(walk.iter());
-        assert!(views.len() == 6 && views.iter().all(|view| view.background.is_none()));
-        assert_eq!(views[3].grey, walk[3].grey);
+        assert!(views.len() == 6 && views.iter().all(|view| !view.is_empty_known));
+        assert!(
+            views[3].pixels.pixels().iter().zip(walk[3].grey.pixels()).all(|(pair, grey)| pair[0] == *grey)
+        );
     }
 
     #[test]

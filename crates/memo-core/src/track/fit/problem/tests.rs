@@ -13,8 +13,8 @@ fn a_short_walk_and_an_empty_picture_are_no_person() {
         time_s: 0.04 * k as f64,
         view: View {
             corner: [0, 0],
-            grey: grey.clone(),
-            background: Some(grey.clone()),
+            pixels: View::paired(&grey, |y| grey.row(y)),
+            is_empty_known: true,
             others: Vec::new(),
             crown_px: None,
         },
@@ -59,8 +59,8 @@ fn drawn() -> Drawn {
             time_s: truth.time_s,
             view: View {
                 corner: [0, 0],
-                grey: scene.frame(truth.frame),
-                background: Some(background.clone()),
+                pixels: View::paired(&scene.frame(truth.frame), |y| background.row(y)),
+                is_empty_known: true,
                 others: Vec::new(),
                 crown_px: None,
             },
