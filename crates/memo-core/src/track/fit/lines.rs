@@ -57,6 +57,8 @@ pub struct Workspace {
     view: PreparedView,
     visible: Vec<VisibleSegment>,
     outlines: Vec<Option<Outline>>,
+    /// Those that may cover what is beside a line.
+    near: Vec<usize>,
     pub samples: Vec<Sample>,
     pub motion: Vec<(usize, DVec3)>,
     pub profile: Profile,
@@ -115,7 +117,7 @@ pub fn samples(
     spacing_px: f64,
     work: &mut Workspace,
 ) {
-    let Workspace { view, visible, outlines, samples, .. } = work;
+    let Workspace { view, visible, outlines, near, samples, .. } = work;
     samples.clear();
     let (cylinders, eye) = (&figure.posed.cylinders, camera.position());
     let has_ends = |part: usize| has_ends(Part::ALL[part]);
@@ -126,15 +128,20 @@ pub fn samples(
         let part = Part::ALL[segment.part];
         let Some(line) = Line::new(segment, part, &cylinders[segment.part], whole, camera) else { continue };
         let count = (line.length_px / spacing_px).round().max(1.0) as usize;
-        for n in 0..count {
-            let on_cylinder = segment.start.lerp(segment.end, (n as f64 + 0.5) / count as f64);
-            let Some(mut sample) = line.sample(on_cylinder, camera) else { continue };
-            let beyond = sample.point_px + 0.75 * spacing_px * sample.normal;
-            let covers = |(other, outline): (usize, &Option<Outline>)| {
-                other != segment.part && outline.as_ref().is_some_and(|outline| outline.contains(beyond))
-            };
-            sample.is_outer = !outlines.iter().enumerate().any(covers);
-            samples.push(sample);
+        let first = samples.len();
+        let on_cylinder = |n: usize| segment.start.lerp(segment.end, (n as f64 + 0.5) / count as f64);
+        samples.extend((0..count).filter_map(|n| line.sample(on_cylinder(n), camera)));
+        let beyond = |sample: &Sample| sample.point_px + 0.75 * spacing_px * sample.normal;
+        let [low, high] =
+            [DVec2::min, DVec2::max].map(|most| samples[first..].iter().map(beyond).reduce(most));
+        let Some((low, high)) = low.zip(high) else { continue };
+        let beside = outlines.iter().enumerate().filter(|(other, _)| *other != segment.part);
+        near.clear();
+        near.extend(beside.filter_map(|(n, outline)| outline.as_ref()?.meets(low, high).then_some(n)));
+        for sample in &mut samples[first..] {
+            let point = beyond(sample);
+            let covers = |&n: &usize| outlines[n].as_ref().is_some_and(|outline| outline.contains(point));
+            sample.is_outer = !near.iter().any(covers);
         }
     }
 }
@@ -223,6 +230,11 @@ impl Outline {
         let corners = [a?, b?, c?, d?];
         let [low, high] = [DVec2::min, DVec2::max].map(|most| corners.into_iter().reduce(most));
         Some(Self { corners, low: low?, high: high? })
+    }
+
+    /// Whether it may contain points between two corners.
+    fn meets(&self, low: DVec2, high: DVec2) -> bool {
+        low.cmple(self.high).all() && high.cmpge(self.low).all()
     }
 
     /// Whether a point is inside; the quadrangle is convex.

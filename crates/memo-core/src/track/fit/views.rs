@@ -157,21 +157,62 @@ impl Backdrop {
     /// One row of the empty scene: the median of the frames in which people are elsewhere, or of all frames where
     /// these are too few.
     fn empty_row(&self, y: usize, whole: &Rectangle, least: usize) -> Vec<u8> {
-        let mut values = Vec::with_capacity(self.frames.len());
-        let mut median = |x: usize| {
-            let is_in = |w: &Rectangle| (w.left..=w.right).contains(&x) && (w.top..=w.bottom).contains(&y);
-            values.clear();
-            let free = self.frames.iter().filter(|kept| !kept.people.iter().any(is_in));
-            values.extend(free.map(|kept| kept.image.row(y)[x]));
-            if values.len() < least {
-                values.clear();
-                values.extend(self.frames.iter().map(|kept| kept.image.row(y)[x]));
-            }
-            let middle = values.len() / 2;
-            if values.is_empty() { 0 } else { *values.select_nth_unstable(middle).1 }
-        };
-        (whole.left..=whole.right).map(&mut median).collect()
+        let rows: Vec<&[u8]> =
+            self.frames.iter().map(|kept| &kept.image.row(y)[whole.left..=whole.right]).collect();
+        let with_people = rows.iter().zip(&self.frames);
+        let free: Vec<Part<'_>> =
+            with_people.flat_map(|(row, kept)| free_parts(row, y, whole.left, &kept.people)).collect();
+        let (mut empty, counts) = medians(&free, whole.width());
+        if counts.iter().any(|&count| usize::from(count) < least) {
+            let all: Vec<Part<'_>> = rows.into_iter().map(|row| (0, row)).collect();
+            let of_all = medians(&all, whole.width()).0;
+            let few = empty.iter_mut().zip(&counts).zip(of_all);
+            few.filter(|((_, count), _)| usize::from(**count) < least)
+                .for_each(|((empty, _), all)| *empty = all);
+        }
+        empty
     }
+}
+
+/// Some columns of a row, from the first of them on.
+type Part<'a> = (usize, &'a [u8]);
+
+/// The parts of a row in which nobody is; its first column is `left`.
+fn free_parts<'a>(row: &'a [u8], y: usize, left: usize, people: &[Rectangle]) -> Vec<Part<'a>> {
+    let mut parts = vec![(0, row)];
+    for window in people.iter().filter(|w| (w.top..=w.bottom).contains(&y)) {
+        let [from, to] = [window.left, window.right + 1].map(|x| x.saturating_sub(left));
+        let beside = |(start, columns): Part<'a>| {
+            let end = start + columns.len();
+            let at = |x: usize| x.clamp(start, end) - start;
+            [(start, &columns[..at(from)]), (start + at(to), &columns[at(to)..])]
+        };
+        parts = parts.into_iter().flat_map(beside).filter(|(_, columns)| !columns.is_empty()).collect();
+    }
+    parts
+}
+
+/// The upper median of each column, 0 of one without values, and how many values it has, at most [`MOST_FRAMES`]. Bit by
+/// bit: the largest value such that at most n / 2 of the n values are smaller.
+fn medians(parts: &[Part<'_>], width: usize) -> (Vec<u8>, Vec<u8>) {
+    let [mut median, mut below, mut counts] = std::array::from_fn(|_| vec![0u8; width]);
+    for (start, columns) in parts {
+        counts[*start..start + columns.len()].iter_mut().for_each(|count| *count += 1);
+    }
+    for bit in (0..8).rev() {
+        below.fill(0);
+        for (start, columns) in parts {
+            let places = *start..start + columns.len();
+            let known = &median[places.clone()];
+            for ((below, &grey), &known) in below[places].iter_mut().zip(*columns).zip(known) {
+                *below += u8::from(grey < known | 1 << bit);
+            }
+        }
+        for ((known, &below), &count) in median.iter_mut().zip(&below).zip(&counts) {
+            *known |= u8::from(count > 0 && below <= count / 2) << bit;
+        }
+    }
+    (median, counts)
 }
 
 #[cfg(test)]
@@ -235,6 +276,45 @@ mod tests {
             }
             // In eight frames the box hardly leaves its place: columns that it always covers stay unknown.
             assert!(if frames == 50 { wrong == 0 } else { wrong > 0 }, "{frames}: {wrong}");
+        }
+    }
+
+    /// Each pixel is the middle one of the sorted values of the frames without people there, or else of all.
+    #[test]
+    fn the_empty_scene_is_the_median_of_what_was_seen() {
+        let value = |n: usize| ((7919 * n + 104_729) % 6_151 % 256) as u8;
+        let image = |k: usize| {
+            let pixels = (0..40 * 6).map(|n| value(n + 977 * k)).collect();
+            Image::from_vec(40, 6, pixels).unwrap()
+        };
+        let of = |left, right, top| Rectangle { left, right, top, bottom: 4 };
+        let people = |k: usize| match k % 3 {
+            0 => vec![of(0, 9 + k, 0), of(5 + k, 30, 2)],
+            1 => vec![of(3 * k, 3 * k + 9, 1), of(36, 39, 0)],
+            _ => Vec::new(),
+        };
+        let whole = Rectangle { left: 3, right: 38, top: 0, bottom: 5 };
+        for frames in [0, 1, 2, 9] {
+            let mut backdrop = Backdrop::default();
+            for k in 0..frames {
+                backdrop.push(k, &image(k));
+                people(k).into_iter().for_each(|window| backdrop.occupy(k, window));
+            }
+            for (y, least) in (0..6).flat_map(|y| [(y, 1), (y, 5)]) {
+                let row = backdrop.empty_row(y, &whole, least);
+                for x in whole.left..=whole.right {
+                    let is_in =
+                        |w: &Rectangle| (w.left..=w.right).contains(&x) && (w.top..=w.bottom).contains(&y);
+                    let free = (0..frames).filter(|&k| !people(k).iter().any(is_in));
+                    let mut values: Vec<u8> = free.map(|k| image(k).row(y)[x]).collect();
+                    if values.len() < least {
+                        values = (0..frames).map(|k| image(k).row(y)[x]).collect();
+                    }
+                    values.sort_unstable();
+                    let wanted = values.get(values.len() / 2).copied().unwrap_or(0);
+                    assert_eq!(row[x - whole.left], wanted, "{frames} frames, {x} {y}, {least}");
+                }
+            }
         }
     }
 
