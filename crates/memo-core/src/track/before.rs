@@ -3,22 +3,23 @@
 //! A walk starts on a region that is one person's for some frames. Before, the person may have been one region with somebody
 //! else, or a start may have been refused. Once the walk is over, body, route, speed and cadence are known:
 //!
-//! 1. What the regions of the frames before the start showed was kept.
+//! 1. What the regions of the frames before the start showed was kept. Nearer people who were not followed then either stand
+//!    in front where their first steps lead.
 //! 2. From the start backwards, the person is searched in each near where the first steps lead, as long as the contours are
-//!    about as similar as in the walk.
+//!    about as similar as in the walk and others do not hide most of the person.
 //! 3. From the earliest of these frames on, all are followed again.
 
 use super::active::Active;
 use super::candidate::{MISSED_FRAMES, Seen};
-use super::crowd::body_box;
-use super::decisions::LOST_SHARE;
+use super::crowd::{Expected, body_box, keep_unowned};
+use super::decisions::{DECIDING_SHARE, LOST_SHARE};
 use super::fit::views::Piece;
 use super::options::TrackerOptions;
 use super::search::{Axis, Grid, Hypothesis, PHASE_STEP, POSITION_STEP_M, Scene, search_peak};
 use super::standing::Standing;
-use super::walk::{Beginning, State, Walk};
+use super::walk::{Beginning, FrameEdges, State, Step, Walk};
 use crate::estimate::line::line_through;
-use crate::model::Others;
+use crate::model::{Camera, Others};
 
 /// So much of what a frame's place and phase are off is expected in the frame before.
 const DRIFT: f64 = 0.5;
@@ -29,22 +30,90 @@ const LEAST_IN_WINDOW: f64 = 0.95;
 /// The frames of the walk may become less similar by this share.
 const MOST_LOST: f64 = 0.01;
 
-impl Active {
-    /// Begins the walk with the frames before it in which the contours show it too.
-    pub(super) fn begin_before(&mut self, options: &TrackerOptions) {
-        let before = std::mem::take(&mut self.before);
-        let is_whole = self.kept.len() == self.steps().len();
-        if before.is_empty() || self.is_on_treadmill || self.frontal.is_some() || !is_whole {
-            return;
-        }
-        // 1. Where the first steps lead.
-        let first = &self.steps()[..self.steps().len().min(2 * options.start_frames)];
+/// The person in a region.
+struct Found {
+    best: Hypothesis,
+    /// Similarity times the visible share.
+    similarity: f64,
+    visible: f32,
+}
+
+/// Where the first steps of a walk lead.
+struct Lead {
+    speed_mps: f64,
+    along_m: f64,
+    rate_hz: f64,
+    phase: f64,
+    height_m: f64,
+}
+
+impl Lead {
+    fn of(steps: &[Step], options: &TrackerOptions) -> Self {
+        let first = &steps[..steps.len().min(2 * options.start_frames)];
         let line = |of: fn(&State) -> f64| {
             line_through(&first.iter().map(|step| (step.time_s, of(&step.state))).collect::<Vec<_>>())
         };
         let (speed_mps, along_m) = line(|state| state.along.position);
         let (rate_hz, phase) = line(|state| state.phase.position);
         let height_m = first.iter().map(|step| step.state.height.position).sum::<f64>() / first.len() as f64;
+        Self { speed_mps, along_m, rate_hz, phase, height_m }
+    }
+
+    fn at(&self, time_s: f64) -> Hypothesis {
+        let Self { speed_mps, along_m, rate_hz, phase, height_m } = *self;
+        Hypothesis { along_m: along_m + speed_mps * time_s, height_m, phase: phase + rate_hz * time_s }
+    }
+}
+
+/// Somebody else, with the frames in which that person is followed and those before.
+pub(super) struct Beside<'a> {
+    walk: &'a Walk,
+    camera: &'a Camera,
+    lead: Lead,
+}
+
+impl<'a> Beside<'a> {
+    pub fn new(walk: &'a Walk, camera: &'a Camera, options: &TrackerOptions) -> Option<Self> {
+        let steps = &walk.twins[walk.best()].steps;
+        (!steps.is_empty()).then(|| Self { walk, camera, lead: Lead::of(steps, options) })
+    }
+
+    /// The person in a frame; `None` after the walk, or if nothing of the person is before the camera.
+    fn in_frame(&self, seen: &Seen) -> Option<Expected> {
+        let steps = &self.walk.twins[self.walk.best()].steps;
+        let FrameEdges { frame, time_s, window, .. } = seen.edges;
+        let after = steps.partition_point(|step| step.frame < frame);
+        let place = match steps.get(after)? {
+            step if step.frame == frame => step.state.hypothesis(),
+            _ if after == 0 => self.lead.at(time_s),
+            _ => return None,
+        };
+        let path = self.walk.route.at(place.along_m);
+        let scene = Scene::new(&self.walk.walker, self.camera, &path);
+        let body = scene.pose(&place);
+        let [low, high] = body_box(self.camera, &body.cylinders)?;
+        let other = Hypothesis { phase: place.phase + 0.5, ..place };
+        Some(Expected {
+            window,
+            height_px: high.y - low.y,
+            distance_m: body.torso_centre.distance(self.camera.position()),
+            lines: [place, other].iter().flat_map(|twin| scene.lines(twin)).collect(),
+            body: body.cylinders,
+        })
+    }
+}
+
+impl Active {
+    /// Begins the walk with the frames before it in which the contours show it too.
+    pub(super) fn begin_before(&mut self, beside: &[Beside<'_>], options: &TrackerOptions) {
+        let before = std::mem::take(&mut self.before);
+        let is_whole = self.kept.len() == self.steps().len();
+        if before.is_empty() || self.is_on_treadmill || self.frontal.is_some() || !is_whole {
+            return;
+        }
+        // 1. Where the first steps lead, and who stands in front there.
+        let lead = Lead::of(self.steps(), options);
+        let before: Vec<Seen> = before.iter().map(|seen| self.behind(beside, &lead, seen)).collect();
         let sum = |walk: &Walk, from: usize| -> f64 {
             let steps = &walk.twins[walk.best()].steps[from..];
             steps.iter().map(|step| f64::from(step.similarity * step.visible)).sum()
@@ -57,14 +126,12 @@ impl Active {
         let mut missed = 0;
         for regions in before.chunk_by(|a, b| a.edges.frame == b.edges.frame).rev() {
             let time_s = regions[0].edges.time_s;
-            let led = Hypothesis {
-                along_m: along_m + speed_mps * time_s + along_off,
-                height_m,
-                phase: phase + rate_hz * time_s + phase_off,
-            };
+            let at = lead.at(time_s);
+            let led = Hypothesis { along_m: at.along_m + along_off, phase: at.phase + phase_off, ..at };
             let found = regions.iter().filter_map(|seen| Some((seen, self.similar(&led, seen, options)?)));
-            let most = found.max_by(|(_, a), (_, b)| a.1.total_cmp(&b.1));
-            let Some((seen, (best, _))) = most.filter(|(_, (_, similarity))| *similarity >= least) else {
+            let most = found.max_by(|(_, a), (_, b)| a.similarity.total_cmp(&b.similarity));
+            let shows = |found: &Found| found.similarity >= least && found.visible >= DECIDING_SHARE;
+            let Some((seen, Found { best, .. })) = most.filter(|(_, found)| shows(found)) else {
                 missed += 1;
                 if missed > MISSED_FRAMES {
                     break;
@@ -76,8 +143,13 @@ impl Active {
             phase_off += DRIFT * (cycles - cycles.round());
             missed = 0;
             added.push(seen);
-            beginning =
-                Some(Beginning { time_s, along_m: led.along_m, phase: led.phase, speed_mps, rate_hz });
+            beginning = Some(Beginning {
+                time_s,
+                along_m: led.along_m,
+                phase: led.phase,
+                speed_mps: lead.speed_mps,
+                rate_hz: lead.rate_hz,
+            });
         }
         let Some(beginning) = beginning else { return };
         added.reverse();
@@ -97,8 +169,25 @@ impl Active {
         self.pieces.splice(0..0, pieces.collect::<Vec<_>>());
     }
 
-    /// The most similar hypothesis near one, and its similarity; `None` if the edges of the body were not searched.
-    fn similar(&self, near: &Hypothesis, seen: &Seen, options: &TrackerOptions) -> Option<(Hypothesis, f64)> {
+    /// What a region showed, with the people who stand in front of this one there.
+    fn behind(&self, beside: &[Beside<'_>], lead: &Lead, seen: &Seen) -> Seen {
+        let path = self.walk.route.at(lead.at(seen.edges.time_s).along_m);
+        let scene = Scene::new(&self.walk.walker, &self.camera, &path);
+        let centre = scene.pose(&lead.at(seen.edges.time_s)).torso_centre;
+        let distance_m = centre.distance(self.camera.position());
+        let mut behind = seen.clone();
+        let all = beside.iter().filter_map(|other| other.in_frame(seen));
+        for nearer in all.filter(|other| other.distance_m < distance_m) {
+            behind.edges.shared = true;
+            keep_unowned(&mut behind.edges.edges, &[&nearer]);
+            behind.edges.others.extend(nearer.body);
+            behind.piece.iter_mut().for_each(|piece| piece.others.extend(nearer.body));
+        }
+        behind
+    }
+
+    /// The most similar hypothesis near one; `None` if the edges of the body were not searched.
+    fn similar(&self, near: &Hypothesis, seen: &Seen, options: &TrackerOptions) -> Option<Found> {
         let near = Hypothesis { phase: near.phase.rem_euclid(1.0), ..*near };
         let others = Others::new(&seen.edges.others, self.camera.position());
         let path = self.walk.route.at(near.along_m);
@@ -119,15 +208,16 @@ impl Active {
         let (similarity, hidden_lines) = (&options.walk.similarity, options.walk.hidden_lines);
         let found = search_peak(&seen.edges.edges, &scene, &grid, similarity, hidden_lines);
         let visible = scene.visible_share(&near);
-        Some((found.best(), f64::from(found.best_score() * visible)))
+        Some(Found { best: found.best(), similarity: f64::from(found.best_score() * visible), visible })
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::active::tests::{BEGINNING, PATH, active, frames_on, options};
-    use super::super::walk::FrameEdges;
+    use super::super::search::Path;
     use super::*;
+    use glam::DVec2;
     use std::sync::Arc;
 
     const FRAME_S: f64 = 0.05;
@@ -159,8 +249,12 @@ mod tests {
         active
     }
 
-    fn first_frame(mut active: Active) -> usize {
-        active.begin_before(&options());
+    fn first_frame(active: Active) -> usize {
+        first_frame_beside(active, &[])
+    }
+
+    fn first_frame_beside(mut active: Active, beside: &[Beside<'_>]) -> usize {
+        active.begin_before(beside, &options());
         let steps = active.steps();
         assert_eq!(steps.len(), active.kept.len());
         for (step, (_, edges)) in steps.iter().zip(&active.kept) {
@@ -213,6 +307,23 @@ mod tests {
         assert_eq!(first_frame(cut), 10);
     }
 
+    /// Somebody else may stand in front in these frames, who was not followed then either.
+    #[test]
+    fn what_may_be_the_contours_of_somebody_in_front_is_nobody_elses() {
+        let camera = begun().camera;
+        for (nearer_m, first) in [(1.5, FIRST), (-1.5, 0)] {
+            // In the same line of sight.
+            let mut walk = begun().walk;
+            walk.route = Path { origin: DVec2::new(0.0, -nearer_m), ..PATH }.into();
+            let distance_m = camera.position().y.abs();
+            for step in walk.twins.iter_mut().flat_map(|twin| &mut twin.steps) {
+                step.state.along.position *= (distance_m - nearer_m) / distance_m;
+            }
+            let other = Beside::new(&walk, &camera, &options()).unwrap();
+            assert_eq!(first_frame_beside(begun(), &[other]), first, "{nearer_m} m nearer");
+        }
+    }
+
     #[test]
     fn who_is_followed_by_the_feet_or_walks_on_the_spot_begins_as_before() {
         let mut on_the_spot = begun();
@@ -223,7 +334,7 @@ mod tests {
         assert_eq!(first_frame(nothing), FIRST);
         let mut thinned = begun();
         thinned.kept.drain(..3);
-        thinned.begin_before(&options());
+        thinned.begin_before(&[], &options());
         assert_eq!(thinned.steps()[0].frame, FIRST, "the first frames are gone");
     }
 }

@@ -28,6 +28,7 @@ mod on_the_spot;
 mod unfollowed;
 
 use super::active::Active;
+use super::before::Beside;
 use super::candidate::{Candidate, Given, MISSED_FRAMES, Seen};
 use super::crowd::{Expected, body_box, clear_explained, expected, keep_own, keep_unowned};
 use super::decisions::{OUTSIDE_SHARE, SAME_BODY, SAME_PLACE_M};
@@ -835,7 +836,11 @@ impl Tracker {
         active.settle(&self.backdrop, &self.options);
         // On a smoothed route, the feet would walk on.
         let standing = active.standing();
-        active.begin_before(&self.options);
+        let followed = self.people.iter().map(|other| (&other.walk, &other.camera));
+        let ended = self.finished.iter().map(|other| (&other.walk, &other.camera));
+        let beside =
+            followed.chain(ended).filter_map(|(walk, camera)| Beside::new(walk, camera, &self.options));
+        active.begin_before(&beside.collect::<Vec<_>>(), &self.options);
         active.begin_earlier(&self.options);
         active.turned(&self.options);
         active.pace_all();
