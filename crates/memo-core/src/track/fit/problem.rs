@@ -135,6 +135,9 @@ const LEAST_REACH_PX: f64 = 4.0;
 const FEW_FRAMES: usize = 24;
 const FEW_S: f64 = 0.125;
 
+/// Below this visible share, the fit with exchanged sides does not start from the steps of the other fit.
+const SEEN_SHARE: f64 = 0.8;
+
 impl<'a> Problem<'a> {
     pub fn new(
         camera: &'a Camera,
@@ -210,7 +213,12 @@ impl<'a> Problem<'a> {
             return Err(FitError::TooFewFrames { got: self.frames.len() });
         }
         let (start, _) = self.best_start(0.0).ok_or(FitError::Undetermined)?;
-        let exchanged = p_tracked_swapped.map(|_| start.exchanged());
+        // What is hidden holds no fit in place, so one with exchanged sides then takes first steps of its own.
+        let is_hidden = self.visible_share < SEEN_SHARE;
+        let exchanged = p_tracked_swapped.and_then(|_| match is_hidden {
+            true => self.best_start(0.5).map(|(start, _)| start),
+            false => Some(start.exchanged()),
+        });
         let (as_tracked, exchanged) =
             rayon::join(|| self.finished(start), || exchanged.and_then(|start| self.finished(start)));
         let as_tracked = as_tracked.ok_or(FitError::Undetermined)?;

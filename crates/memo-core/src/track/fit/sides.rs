@@ -17,14 +17,15 @@ pub fn evidence(chosen: &Seen, other: &Seen) -> f64 {
         + SIDES_LOST * (lost(other) - lost(chosen))
 }
 
-/// Probability of the `other` choice of sides; `p_tracked` is that by the tracker. The evidence is of ratios: of a person
-/// of whom others hid a part, the same ratios show less, in proportion to the `visible` share, and so they do where neither
-/// fit finds the outline.
+/// Probability of the `other` choice of sides; `p_tracked` is that by the tracker. Both go by ratios of what is seen: of a
+/// person of whom others hid a part, the same ratios show less, in proportion to the `visible` share. Those of the fits
+/// do so, too, where neither fit finds the outline.
 pub fn p_other(chosen: &Seen, other: &Seen, p_tracked: f64, visible: f64) -> f64 {
     let p = p_tracked.clamp(1e-6, 1.0 - 1e-6);
     let clear = SIDES_OFF / (SIDES_OFF + chosen.off().min(other.off()));
-    let by_fit = SIDES_LOG_ODDS * visible * clear * evidence(chosen, other);
-    let log_odds = by_fit + SIDES_OF_TRACKER * ((1.0 - p) / p).ln();
+    let by_fit = SIDES_LOG_ODDS * clear * evidence(chosen, other);
+    let by_tracker = SIDES_OF_TRACKER * ((1.0 - p) / p).ln();
+    let log_odds = visible * (by_fit + by_tracker);
     1.0 / (1.0 + log_odds.exp())
 }
 
@@ -48,7 +49,7 @@ mod tests {
             assert!((p_other(&a, &b, 0.5, 1.0) + p_other(&b, &a, 0.5, 1.0) - 1.0).abs() < 1e-12);
         }
         let [whole, half] =
-            [1.0, 0.5].map(|visible| p_other(&seen(10.0, 5.0), &seen(15.0, 5.0), 0.5, visible));
+            [1.0, 0.5].map(|visible| p_other(&seen(10.0, 5.0), &seen(15.0, 5.0), 0.2, visible));
         let log_odds = |p: f64| ((1.0 - p) / p).ln();
         assert!(
             (log_odds(half) - 0.5 * log_odds(whole)).abs() < 1e-9,
