@@ -1,7 +1,7 @@
 //! Initial contacts and toe-offs from the motion of the fitted feet.
 //!
 //! In stance a foot stands still, in swing it is faster than the body. Contact is the time at which the heel's speed
-//! along the path falls below a share of the walking speed, toe-off the time at which the speed of the tip of the toes
+//! along the path falls below a share of the walking speed, and a little later, toe-off the time at which the speed of the tip of the toes
 //! rises above one. Both are searched near the phases at which they happen in everybody, and interpolated between frames.
 
 use crate::model::skeleton::Side;
@@ -20,10 +20,13 @@ pub struct Contact {
 }
 
 /// The shares of the walking speed that separate stance from swing, of the heel at contact and of the toes at toe-off.
-/// Between 0.25 and 0.4 of the heel the times move by 25 ms. At 0.28 they are late by 18 and 43 ms on two filmed people,
-/// and early by 2 to 37 ms on six drawn ones, whose true contacts are those of the ankle's speed.
+/// Between 0.25 and 0.4 of the heel the times move by 25 ms.
 const HEEL_SHARE: f64 = 0.28;
 const TOE_SHARE: f64 = 0.4;
+/// The initial contact is this much later, seconds. The fitted heel slows before: of nine drawn people by 17 ms on average,
+/// of eight by 2 to 24 ms, of one slow walker by 39. Of the six whose true contacts agree with force plates or markers to
+/// mostly 10 ms, it is 13. Two filmed people, whose contacts were marked by eye, are then 35 and 60 ms late.
+const CONTACT_LATER_S: f64 = 0.017;
 /// Contacts lie this near to phase 0 of the side, toe-offs to the end of stance, cycles.
 const NEAR: f64 = 0.2;
 const TOE_OFF_PHASE: f64 = 0.61;
@@ -46,9 +49,9 @@ pub fn contacts(times_s: &[f64], phases: &[f64], feet: &[[[DVec3; 2]; 2]], ahead
     let mut contacts = Vec::new();
     for (side, name) in [Side::Right, Side::Left].into_iter().enumerate() {
         let later = 0.5 * side as f64;
-        for (kind, point, at, share, rises) in [
-            (EventKind::HeelStrike, 0, 0.0, HEEL_SHARE, false),
-            (EventKind::ToeOff, 1, TOE_OFF_PHASE, TOE_SHARE, true),
+        for (kind, point, at, share, rises, later_s) in [
+            (EventKind::HeelStrike, 0, 0.0, HEEL_SHARE, false, CONTACT_LATER_S),
+            (EventKind::ToeOff, 1, TOE_OFF_PHASE, TOE_SHARE, true, 0.0),
         ] {
             // Speed over the walking speed, between frames.
             let speed = |k: usize| moved(k, side, point) / (times_s[k + 1] - times_s[k]) / walking_mps;
@@ -73,7 +76,9 @@ pub fn contacts(times_s: &[f64], phases: &[f64], feet: &[[[DVec3; 2]; 2]], ahead
             // Of several crossings in one cycle, the one nearest to the usual phase.
             found.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
             found.dedup_by_key(|f| f.0);
-            contacts.extend(found.into_iter().map(|(_, _, time_s)| Contact { time_s, kind, side: name }));
+            let seen =
+                found.into_iter().map(|(_, _, time_s)| time_s + later_s).filter(|&t| t <= times_s[count - 1]);
+            contacts.extend(seen.map(|time_s| Contact { time_s, kind, side: name }));
         }
     }
     contacts.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
@@ -132,16 +137,17 @@ mod tests {
             (EventKind::ToeOff, Side::Right, vec![0.62, 1.62, 2.62]),
             (EventKind::ToeOff, Side::Left, vec![0.12, 1.12, 2.12]),
         ] {
+            let later_s = if kind == EventKind::HeelStrike { CONTACT_LATER_S } else { 0.0 };
             let times: Vec<f64> =
                 found.iter().filter(|c| (c.kind, c.side) == (kind, side)).map(|c| c.time_s).collect();
             assert_eq!(times.len(), expected.len(), "{kind:?} {side:?}: {times:?}");
             times
                 .iter()
                 .zip(expected)
-                .for_each(|(t, e)| assert!((t - e).abs() < 0.02, "{kind:?} {side:?}: {t} {e}"));
+                .for_each(|(t, e)| assert!((t - e - later_s).abs() < 0.01, "{kind:?} {side:?}: {t} {e}"));
         }
-        // The phases are ahead by 0.03; heels stop at 0 and 0.5.
-        assert!((mean_phase(&found, &times_s, &phases) - 0.03).abs() < 0.01);
+        // The phases are ahead by 0.03; heels stop at 0 and 0.5 of a cycle of a second.
+        assert!((mean_phase(&found, &times_s, &phases) - 0.03 - CONTACT_LATER_S).abs() < 0.01);
         assert_eq!(mean_phase(&[], &times_s, &phases), 0.0);
         assert!(contacts(&times_s[..2], &phases[..2], &all[..2], &ahead).is_empty());
         let backwards: Vec<f64> = phases.iter().map(|p| -p).collect();
@@ -165,6 +171,6 @@ mod tests {
         // Before the first frame nobody knows whether the foot moved.
         let landed = times.iter().filter(|t| **t > 0.5).zip([1.0, 2.0]);
         assert_eq!(landed.clone().count(), 2, "{times:?}");
-        landed.for_each(|(t, expected)| assert!((t - expected).abs() < 0.02, "{times:?}"));
+        landed.for_each(|(t, stops)| assert!((t - stops - CONTACT_LATER_S).abs() < 0.01, "{times:?}"));
     }
 }
