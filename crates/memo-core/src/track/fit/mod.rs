@@ -11,7 +11,8 @@
 //!    count become smaller from step to step.
 //! 4. The first steps are made from several gaits; the one whose contours are nearest goes on.
 //! 5. The joint curves are fitted first, then what each frame deviates from them.
-//! 6. The steps after the first ones are made again with left and right exchanged, and the evidence decides (`sides`).
+//! 6. The steps after the first ones are made again with left and right exchanged, of a person whom others hide in part the
+//!    first ones too, and the evidence decides (`sides`).
 //! 7. Standard deviations follow from the normal equations.
 //!
 //! The normal equations (`normal`) have the form of an arrow ([`estimate::arrow`](crate::estimate::arrow)), so the time
