@@ -3,8 +3,8 @@
 use super::candidate::Seen;
 use super::crowd::{Expected, body_box, expected};
 use super::decisions::{
-    DECIDING_SHARE, LONGEST_HIDDEN_S, LOST_SHARE, MOST_MISSED_TO_ADOPT, SLANT_GAIN, SLOWEST_HZ, SLOWEST_MPS,
-    STANDING_SHARE, STRIDE_HEIGHTS,
+    DECIDING_SHARE, LEAST_CHANGING, LONGEST_HIDDEN_S, LOST_SHARE, MOST_MISSED_TO_ADOPT, SLANT_GAIN,
+    SLOWEST_HZ, SLOWEST_MPS, STANDING_SHARE, STRIDE_HEIGHTS,
 };
 use super::fit::of_walk::Tracked;
 use super::fit::views::{Backdrop, Piece};
@@ -40,6 +40,20 @@ fn matched(steps: &[Step]) -> Option<f64> {
     let visible: f32 = steps.iter().map(|s| s.visible).sum();
     let found: f32 = steps.iter().map(|s| s.similarity * s.visible).sum();
     (visible >= DECIDING_SHARE * steps.len() as f32).then(|| f64::from(found / visible))
+}
+
+/// Mean share of the image about a person that changes, by the share that is visible; `None` if it is mostly unknown.
+fn changing(steps: &[Step]) -> Option<f32> {
+    let known = || steps.iter().filter_map(|step| Some((step.visible, step.changing?)));
+    let visible: f32 = known().map(|(visible, _)| visible).sum();
+    let changing: f32 = known().map(|(visible, changing)| visible * changing).sum();
+    (visible >= DECIDING_SHARE * steps.len() as f32).then(|| changing / visible)
+}
+
+/// Nobody is where less than this share of the image about the model changes: much less than usually.
+fn least_changing(steps: &[Step]) -> f32 {
+    let usual = changing(steps).unwrap_or(0.0);
+    LEAST_CHANGING.max(LOST_SHARE as f32 * usual)
 }
 
 /// Mean similarity of a twin by the share that is visible.
@@ -288,7 +302,9 @@ impl Active {
         let twin = &self.walk.twins[self.walk.best()];
         let low = LOST_SHARE * usual_similarity(twin);
         let absent = twin.steps.iter().take_while(|s| f64::from(s.similarity) < low).count();
-        let is_gone = |s: &&Step| f64::from(s.similarity) < low || s.visible < DECIDING_SHARE;
+        let least = least_changing(&twin.steps);
+        let is_empty = |s: &Step| s.changing.is_some_and(|changing| changing < least);
+        let is_gone = |s: &&Step| f64::from(s.similarity) < low || s.visible < DECIDING_SHARE || is_empty(s);
         let gone =
             Some(twin.steps.iter().rev().take_while(is_gone).count()).filter(|gone| *gone >= LEAST_GONE);
         let over = if self.is_over() { RECENT_FRAMES / 2 } else { 0 };
@@ -525,7 +541,18 @@ pub(super) mod tests {
         let (alongs, heights) = (Axis::around(along_m, 0.1, 0.02), Axis::around(1.15, 0.1, 0.02));
         let look = Look { window: WINDOW, alongs, heights, best: state.hypothesis(), path: PATH };
         let (time_s, measured) = (FRAME_S * frame as f64, Some(state.hypothesis()));
-        Step { frame, time_s, state, measured, similarity, visible: 1.0, shared: false, by_feet: false, look }
+        Step {
+            frame,
+            time_s,
+            state,
+            measured,
+            similarity,
+            visible: 1.0,
+            changing: None,
+            shared: false,
+            by_feet: false,
+            look,
+        }
     }
 
     /// A good walk of `count` frames whose last twelve have these speeds and this similarity.
@@ -740,6 +767,27 @@ pub(super) mod tests {
         lost.walk.twins[0].steps.iter_mut().for_each(|step| step.similarity = 0.0);
         lost.trim();
         assert!(lost.walk.twins[0].steps.is_empty(), "nobody was there");
+    }
+
+    /// Somebody vanishes, and the model walks on along edges of the room.
+    #[test]
+    fn a_walk_does_not_end_where_nothing_changes() {
+        let last = |usual: f32, end: f32, visible: f32| {
+            let mut walk = ending(40, 1.2, 0.9, 0.4);
+            for twin in &mut walk.walk.twins {
+                twin.steps.iter_mut().for_each(|step| step.changing = Some(usual));
+                twin.steps[34..].iter_mut().for_each(|step| step.changing = Some(end));
+                twin.steps.iter_mut().for_each(|step| step.visible = visible);
+                twin.steps[15].changing = Some(0.0);
+            }
+            walk.trim();
+            frames(&walk)
+        };
+        assert_eq!(last(0.7, 0.0, 1.0), (0, 33));
+        assert_eq!(last(0.7, 0.2, 0.5), (0, 33), "as much as another person beside leaves");
+        assert_eq!(last(0.7, 0.4, 1.0), (0, 39), "a person who turns into the line of sight");
+        assert_eq!(last(0.3, 0.2, 1.0), (0, 39), "who walks towards the camera changes little");
+        assert_eq!(last(0.3, 0.1, 1.0), (0, 33));
     }
 
     /// Twelve frames with the contours of a person who walks along `path` and the rectangles of a person who

@@ -93,21 +93,56 @@ fn turn(line: &ModelLine, edge: &EdgeLine) -> f32 {
 
 /// Clears the changes that a body explains: within a margin of its parts.
 pub(super) fn clear_explained(mask: &mut Mask, camera: &Camera, body: &[EllipticCylinder], height_px: f64) {
+    paint_body(mask, [0, 0], camera, body, height_px, false);
+}
+
+/// Share of the image on and about a body, as far as nearer bodies leave it free, that changes; `None` if they leave
+/// nothing.
+pub(super) fn changing_share(
+    mask: &Mask,
+    camera: &Camera,
+    own: &Expected,
+    nearer: &[EllipticCylinder],
+) -> Option<f32> {
+    let (window, height_px) = (&own.window, own.height_px);
+    let mut near = Mask::filled(window.width(), window.height(), false);
+    let corner = [window.left, window.top];
+    paint_body(&mut near, corner, camera, &own.body, height_px, true);
+    paint_body(&mut near, corner, camera, nearer, height_px, false);
+    let (mut all, mut changing) = (0_u32, 0_u32);
+    for y in 0..near.height() {
+        let row = &mask.row(window.top + y)[window.left..=window.right];
+        for (near, changes) in near.row(y).iter().zip(row) {
+            all += u32::from(*near);
+            changing += u32::from(*near && *changes);
+        }
+    }
+    (all > 0).then(|| changing as f32 / all as f32)
+}
+
+/// Sets all pixels within a margin of a body's parts in a part of the image that begins at a corner.
+fn paint_body(
+    mask: &mut Mask,
+    corner: [usize; 2],
+    camera: &Camera,
+    body: &[EllipticCylinder],
+    height_px: f64,
+    value: bool,
+) {
     let margin_px = EXPLAINED * height_px;
+    let corner = DVec2::from(corner.map(|x| x as f64));
     for part in body {
         let axis = part.world_from_cylinder.matrix3.z_axis * part.half_length;
-        let [Some(a), Some(b)] = [part.centre() - axis, part.centre() + axis].map(|p| camera.project(p))
-        else {
-            continue;
-        };
+        let ends = [part.centre() - axis, part.centre() + axis].map(|p| camera.project(p));
+        let [Some(a), Some(b)] = ends else { continue };
         let depth_m = camera.camera_from_world(part.centre()).z;
         let radius_px = part.semi_axes.max_element() * camera.focal_px.y / depth_m + margin_px;
-        clear_capsule(mask, [a, b], radius_px);
+        paint_capsule(mask, [a - corner, b - corner], radius_px, value);
     }
 }
 
-/// Clears all pixels within a radius of a segment.
-fn clear_capsule(mask: &mut Mask, [a, b]: [DVec2; 2], radius_px: f64) {
+/// Sets all pixels within a radius of a segment.
+fn paint_capsule(mask: &mut Mask, [a, b]: [DVec2; 2], radius_px: f64, value: bool) {
     let (low, high) = (a.min(b) - radius_px, a.max(b) + radius_px);
     let size = DVec2::new(mask.width() as f64, mask.height() as f64);
     if high.min_element() < 0.0 || low.x >= size.x || low.y >= size.y {
@@ -121,7 +156,7 @@ fn clear_capsule(mask: &mut Mask, [a, b]: [DVec2; 2], radius_px: f64) {
             let share =
                 ((point - a).dot(along) / along.length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
             if point.distance_squared(a + along * share) <= radius_px * radius_px {
-                mask.set(x as usize, y as usize, false);
+                mask.set(x as usize, y as usize, value);
             }
         }
     }
@@ -248,5 +283,38 @@ mod tests {
         for (x, y) in (0..480).step_by(7).flat_map(|y| (0..640).step_by(7).map(move |x| (x, y))) {
             assert!(mask.at(x, y) || !far(x, y), "{x}, {y}");
         }
+    }
+    /// Changes on the left half of the image, then behind somebody who hides the rest of the body.
+    #[test]
+    fn the_changing_share_is_that_of_the_visible_body() {
+        let camera = camera();
+        let own =
+            Expected { window: Rectangle { left: 100, top: 60, right: 539, bottom: 439 }, ..person(300.0) };
+        let mut explained = Image::filled(640, 480, true);
+        clear_explained(&mut explained, &camera, &own.body, own.height_px);
+        let counted = |changes: &dyn Fn(usize, usize) -> bool| {
+            let near = (60..440).flat_map(|y| (100..540).map(move |x| (x, y)));
+            let near: Vec<(usize, usize)> = near.filter(|&(x, y)| !explained.at(x, y)).collect();
+            near.iter().filter(|&&(x, y)| changes(x, y)).count() as f32 / near.len() as f32
+        };
+        let mask_of = |changes: &dyn Fn(usize, usize) -> bool| {
+            let mut mask = Image::filled(640, 480, false);
+            (0..480).for_each(|y| (0..640).for_each(|x| mask.set(x, y, changes(x, y))));
+            mask
+        };
+        let centre_px = camera.project(own.body[0].centre()).unwrap();
+        let left = |x: usize, _: usize| (x as f64) < centre_px.x;
+        let share = changing_share(&mask_of(&left), &camera, &own, &[]).unwrap();
+        assert!((0.2..0.8).contains(&share) && (share - counted(&left)).abs() < 1e-6, "{share}");
+        // What a nearer body hides counts neither as changing nor as still.
+        let upper: Vec<EllipticCylinder> =
+            own.body.iter().filter(|part| part.centre().z > 0.9).copied().collect();
+        let mut free = Image::filled(640, 480, true);
+        clear_explained(&mut free, &camera, &upper, own.height_px);
+        let is_seen = |x: usize, y: usize| free.at(x, y);
+        assert_eq!(changing_share(&mask_of(&is_seen), &camera, &own, &upper), Some(1.0));
+        let is_hidden = |x: usize, y: usize| !free.at(x, y);
+        assert_eq!(changing_share(&mask_of(&is_hidden), &camera, &own, &upper), Some(0.0));
+        assert_eq!(changing_share(&mask_of(&left), &camera, &own, &own.body), None, "all hidden");
     }
 }

@@ -30,7 +30,7 @@ mod unfollowed;
 use super::active::Active;
 use super::before::Beside;
 use super::candidate::{Candidate, Given, MISSED_FRAMES, Seen};
-use super::crowd::{Expected, body_box, clear_explained, expected, keep_own, keep_unowned};
+use super::crowd::{Expected, body_box, changing_share, clear_explained, expected, keep_own, keep_unowned};
 use super::decisions::{OUTSIDE_SHARE, SAME_BODY, SAME_PLACE_M};
 use super::evidence::{Evidence, EvidenceError, EvidenceOptions, EvidenceStream};
 use super::fit::FitError;
@@ -454,6 +454,8 @@ impl Tracker {
             );
             edges.shared = !meeting.is_empty();
             edges.newcomer = self.candidates.iter().any(|candidate| candidate.is_newcomer(&own.window));
+            let camera = &self.people[k].camera;
+            edges.changing = changing_share(&evidence.mask, camera, own, &others);
             edges.others.clone_from(&others);
             // 3. A rectangle that nobody else is in.
             let overlaps = |region: &&Rectangle| region.gap(&own.window) == [0, 0];

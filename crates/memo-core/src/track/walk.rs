@@ -147,6 +147,8 @@ pub struct Step {
     pub similarity: f32,
     /// Share of the person's contours that no other person hides, 0 to 1.
     pub visible: f32,
+    /// Share of the image about the visible body that changes; `None` if that is not known.
+    pub changing: Option<f32>,
     /// True if other people were near.
     pub shared: bool,
     /// True if the state is what the feet show of somebody who walks along the line of sight.
@@ -200,12 +202,15 @@ pub struct FrameEdges {
     pub shared: bool,
     /// True if somebody may be near who is not followed yet, so that some of the edges may be that person's.
     pub newcomer: bool,
+    /// Share of the image about the person's visible body that changes; `None` if that is not known.
+    pub changing: Option<f32>,
 }
 
 impl FrameEdges {
     /// The edges near a person who is alone.
     pub fn of_one_alone(frame: usize, time_s: f64, window: Rectangle, edges: Vec<EdgeLine>) -> Self {
-        Self { frame, time_s, window, edges, others: Vec::new(), shared: false, newcomer: false }
+        let (others, changing) = (Vec::new(), None);
+        Self { frame, time_s, window, edges, others, shared: false, newcomer: false, changing }
     }
 }
 
@@ -371,6 +376,7 @@ fn match_frame(edges: &FrameEdges, scene: &Scene<'_>, predicted: &State, options
         measured,
         similarity,
         visible,
+        changing: edges.changing,
         shared: edges.shared,
         by_feet: false,
         look,
@@ -471,6 +477,7 @@ mod tests {
             measured: Some(measured),
             similarity,
             visible: 1.0,
+            changing: None,
             shared: false,
             by_feet: false,
             look,

@@ -101,6 +101,7 @@ fn tracked(measured: &[Measured], path: Path, direction: Direction) -> TrackedWa
             measured: Some(hypothesis),
             similarity: 0.5,
             visible: 1.0,
+            changing: None,
             shared: false,
             by_feet: false,
             look,

@@ -54,6 +54,7 @@ fn followed(path: Path, frames: &[(f64, Option<Hypothesis>)], options: WalkOptio
             measured,
             similarity,
             visible: 1.0,
+            changing: None,
             shared: false,
             by_feet: false,
             look,

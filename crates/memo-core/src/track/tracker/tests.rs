@@ -273,6 +273,7 @@ fn step(frame: usize, along_m: f64, speed_mps: f64) -> Step {
         measured: Some(best),
         similarity: 0.5,
         visible: 1.0,
+        changing: None,
         shared: false,
         by_feet: false,
         look,
