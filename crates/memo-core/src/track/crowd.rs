@@ -148,15 +148,15 @@ fn paint_capsule(mask: &mut Mask, [a, b]: [DVec2; 2], radius_px: f64, value: boo
     if high.min_element() < 0.0 || low.x >= size.x || low.y >= size.y {
         return;
     }
-    let (low, high) = (low.max(DVec2::ZERO).as_u64vec2(), high.min(size - 1.0).as_u64vec2());
+    let (low, high) = (low.max(DVec2::ZERO).as_usizevec2(), high.min(size - 1.0).as_usizevec2());
     let along = b - a;
+    let per_length = along / along.length_squared().max(f64::MIN_POSITIVE);
     for y in low.y..=high.y {
-        for x in low.x..=high.x {
-            let point = DVec2::new(x as f64, y as f64);
-            let share =
-                ((point - a).dot(along) / along.length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
-            if point.distance_squared(a + along * share) <= radius_px * radius_px {
-                mask.set(x as usize, y as usize, value);
+        for (x, pixel) in (low.x..).zip(&mut mask.row_mut(y)[low.x..=high.x]) {
+            let from_a = DVec2::new(x as f64, y as f64) - a;
+            let nearest = along * from_a.dot(per_length).clamp(0.0, 1.0);
+            if from_a.distance_squared(nearest) <= radius_px * radius_px {
+                *pixel = value;
             }
         }
     }
