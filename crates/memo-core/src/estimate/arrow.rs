@@ -137,7 +137,7 @@ impl Arrow {
         }
     }
 
-    /// Index of an unknown of a frame, for [`Arrow::add_row`] and [`Solution::variance`].
+    /// Index of an unknown of a frame, for [`Arrow::add_row`] and [`Covariance::variance`].
     pub fn index(&self, frame: usize, unknown: usize) -> usize {
         frame * self.block + unknown
     }
@@ -234,31 +234,79 @@ pub struct Solution {
 }
 
 impl Solution {
-    /// Variance of a linear form of the unknowns; `frames` has indices by [`Arrow::index`].
+    /// The covariance of the unknowns, as far as neighbouring frames go, in time that is linear in their number.
     ///
-    /// With e the form's part over the frames, a that over the whole, v = L⁻¹ e: |v|² + (a - Yᵀ v)ᵀ S⁻¹ (a - Yᵀ v).
+    /// Entries Z = F⁻¹ within the band follow from L Lᵀ Z = 1, whose lower triangle is that of Lᵀ Z = L⁻¹: from the last
+    /// column on, Z_ij = (δ_ij / L_jj - Σ_k>j L_kj Z_ki) / L_jj (Takahashi et al. 1973). G = F⁻¹ C solves Lᵀ G = Y.
+    pub fn covariance(&self) -> Covariance {
+        let (factor, mut led, schur) = (&self.factor, self.coupling.clone(), self.schur.clone());
+        let (count, shared, width) = (led.ncols(), led.nrows(), factor.width);
+        let mut inverse = Banded::zeros(count, width);
+        for j in (0..count).rev() {
+            let last = (j + width).min(count - 1);
+            let below: Vec<f64> = (j + 1..=last).map(|k| factor.values[factor.index(k, j)]).collect();
+            let diagonal = factor.values[factor.index(j, j)];
+            for i in (j..=last).rev() {
+                let known = (j + 1..=last).zip(&below);
+                let sum: f64 =
+                    known.map(|(k, l)| l * inverse.values[inverse.index(k.max(i), k.min(i))]).sum();
+                let one = if i == j { 1.0 / diagonal } else { 0.0 };
+                let at = inverse.index(i, j);
+                inverse.values[at] = (one - sum) / diagonal;
+            }
+        }
+        for i in (0..count).rev() {
+            let (before, rest) = led.as_mut_slice().split_at_mut(i * shared);
+            let (first, row, column) = (factor.first(i), factor.row(i), &mut rest[..shared]);
+            let scale = 1.0 / row[row.len() - 1];
+            column.iter_mut().for_each(|x| *x *= scale);
+            for (k, &l) in (first..i).zip(row) {
+                if l != 0.0 {
+                    let above = &mut before[k * shared..(k + 1) * shared];
+                    above.iter_mut().zip(&*column).for_each(|(x, y)| *x -= l * y);
+                }
+            }
+        }
+        Covariance { inverse, led, schur }
+    }
+}
+
+/// The covariance of a solution.
+#[derive(Debug, Clone)]
+pub struct Covariance {
+    /// F⁻¹ within the band.
+    inverse: Banded,
+    /// (F⁻¹ C)ᵀ: one column per unknown of a frame.
+    led: DMatrix<f64>,
+    schur: Cholesky<f64, Dyn>,
+}
+
+impl Covariance {
+    /// Variance of a linear form of the unknowns of the whole and of at most three neighbouring frames, with indices by
+    /// [`Arrow::index`].
+    ///
+    /// With e the form's part over the frames, a that over the whole, d = a - Cᵀ F⁻¹ e: eᵀ F⁻¹ e + dᵀ S⁻¹ d.
+    ///
+    /// # Panics
+    ///
+    /// If frames of the form are farther apart.
     pub fn variance(&self, whole: &[(usize, f64)], frames: &[(usize, f64)]) -> f64 {
-        let count = self.frames.len();
-        let mut left = DVector::zeros(self.whole.len());
+        let mut left = DVector::zeros(self.led.nrows());
         for &(i, a) in whole {
             left[i] += a;
         }
-        let mut v = vec![0.0; count];
+        let mut of_frames = 0.0;
         for &(i, a) in frames {
-            v[i] += a;
-        }
-        let first = frames.iter().map(|f| f.0).min().unwrap_or(count);
-        let mut sum_sq = 0.0;
-        for i in first..count {
-            let row = self.factor.row(i);
-            let before = &v[self.factor.first(i)..i];
-            v[i] = (v[i] - dot(&row[..before.len()], before)) / row[row.len() - 1];
-            sum_sq += v[i] * v[i];
-            if v[i] != 0.0 {
-                left.axpy(-v[i], &self.coupling.column(i), 1.0);
+            left.axpy(-a, &self.led.column(i), 1.0);
+            for &(j, b) in frames {
+                assert!(
+                    i.abs_diff(j) <= self.inverse.width,
+                    "unknowns {i} and {j} are in frames too far apart"
+                );
+                of_frames += a * b * self.inverse.values[self.inverse.index(i.max(j), i.min(j))];
             }
         }
-        sum_sq + left.dot(&self.schur.solve(&left))
+        of_frames + left.dot(&self.schur.solve(&left))
     }
 }
 
@@ -334,8 +382,11 @@ mod tests {
     fn solutions_and_variances_are_those_of_the_dense_system() {
         for (frames, block, whole) in [(1, 3, 2), (2, 2, 4), (7, 3, 5), (12, 4, 1)] {
             let (arrow, h, b) = both(frames, block, whole);
-            let last = arrow.index(frames - 1, block - 1);
+            // Of the first frame and of the last of three, and of the last frame alone.
+            let third = arrow.index(2.min(frames - 1), block - 1);
+            let last = arrow.index(frames - 1, 0);
             let solution = arrow.solve().expect("enough terms");
+            let covariance = solution.covariance();
             let inverse = h.clone().try_inverse().unwrap();
             let expected = &inverse * &b;
             assert!((&solution.whole - expected.rows(0, whole)).norm() < 1e-8);
@@ -343,13 +394,14 @@ mod tests {
             for (of_whole, of_frames) in [
                 (vec![(0, 1.0)], vec![]),
                 (vec![], vec![(0, 1.0)]),
-                (vec![(whole - 1, 0.4)], vec![(0, -1.2), (last, 0.7)]),
+                (vec![(whole - 1, 0.4)], vec![(0, -1.2), (third, 0.7)]),
+                (vec![(0, 0.3)], vec![(last, 1.0), (last + block - 1, -2.0)]),
             ] {
                 let mut form = DVector::zeros(whole + frames * block);
                 of_whole.iter().for_each(|&(i, a): &(usize, f64)| form[i] += a);
                 of_frames.iter().for_each(|&(i, a): &(usize, f64)| form[whole + i] += a);
                 let dense = form.dot(&(&inverse * &form));
-                let found = solution.variance(&of_whole, &of_frames);
+                let found = covariance.variance(&of_whole, &of_frames);
                 assert!((found - dense).abs() < 1e-8 * dense.max(1.0), "{found} against {dense}");
             }
         }

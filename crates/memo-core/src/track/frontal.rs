@@ -524,7 +524,8 @@ impl Frontal {
                 pace.phase = solution.frames[2 * k + 1];
             }
             if step + 1 == STEPS {
-                let of = |k: usize| [2 * k, 2 * k + 1].map(|i| solution.variance(&[], &[(i, 1.0)]));
+                let covariance = solution.covariance();
+                let of = |k: usize| [2 * k, 2 * k + 1].map(|i| covariance.variance(&[], &[(i, 1.0)]));
                 let wanted = if from == 0 { 0..count } else { count - 1..count };
                 variances = Some(wanted.map(of).collect());
             }

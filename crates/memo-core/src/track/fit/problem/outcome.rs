@@ -10,6 +10,7 @@ use super::super::unknowns::{
 };
 use super::super::{FitQuality, FittedFrame, Measured, PartQuality, WalkFit, belt, contacts};
 use super::{Fitted, Problem};
+use crate::estimate::arrow::Covariance;
 use crate::estimate::median::median;
 use crate::track::height::{BodyHeight, HeightSource};
 use glam::DVec2;
@@ -68,6 +69,7 @@ impl Problem<'_> {
     /// Step 7.
     pub(super) fn result(&self, fitted: &Fitted, p_swapped: f64, quality: FitQuality) -> WalkFit {
         let Unknowns { whole, frames } = &fitted.unknowns;
+        let covariance = &fitted.solution.covariance();
         let (turn, left_m) = (whole[WHOLE_HEADING], whole[WHOLE_ACROSS]);
         let ends_m = [0, frames.len() - 1].map(|k| self.along(&frames[k]));
         let bent = self.bend.and_then(|bend| bend.moved(whole, self.route, ends_m));
@@ -81,8 +83,8 @@ impl Problem<'_> {
                 along_m: route.along(figure.posed.torso_centre.truncate(), frames[k][FRAME_ALONG]),
                 phase: frames[k][FRAME_PHASE],
                 posture: posture(&self.walker.gait, whole, &frames[k]),
-                measured: self.measured(fitted, k),
-                sd: self.place_sd(fitted, k),
+                measured: self.measured(fitted, covariance, k),
+                sd: self.place_sd(fitted, covariance, k),
             };
             (frame, [0, 1].map(|side| [-1.0, 1.0].map(|end| figure.sole(side, end))))
         };
@@ -102,7 +104,7 @@ impl Problem<'_> {
         let curves = unknowns::curves(&self.walker.gait, whole, zero);
         WalkFit {
             body: body(&self.walker.body, whole),
-            height: self.height(fitted, &quality),
+            height: self.height(fitted, covariance, &quality),
             route,
             curves,
             frames: all,
@@ -116,9 +118,9 @@ impl Problem<'_> {
 
     /// The body height without the prior of the excess, which is taken out as it was put in: with estimate x and
     /// variance v after all evidence, and prior m, s², the others say x' = v' (x / v - m / s²), 1 / v' = 1 / v - 1 / s².
-    fn height(&self, fitted: &Fitted, quality: &FitQuality) -> Option<BodyHeight> {
+    fn height(&self, fitted: &Fitted, covariance: &Covariance, quality: &FitQuality) -> Option<BodyHeight> {
         let excess: f64 = STATURE.iter().map(|&n| fitted.unknowns.whole[n]).sum();
-        let variance = fitted.solution.variance(&STATURE.map(|n| (n, 1.0)), &[]);
+        let variance = covariance.variance(&STATURE.map(|n| (n, 1.0)), &[]);
         let Prior { mean, sd } = self.excess;
         let weight = variance.recip() - sd.powi(-2);
         let seen = (excess / variance - mean / sd.powi(2)) / weight;
@@ -133,7 +135,7 @@ impl Problem<'_> {
     }
 
     /// The angles of a frame that the pictures determine, with standard deviations.
-    fn measured(&self, fitted: &Fitted, frame: usize) -> [Measured; 2] {
+    fn measured(&self, fitted: &Fitted, covariance: &Covariance, frame: usize) -> [Measured; 2] {
         let (unknowns, off) = (&fitted.unknowns, fitted.seen.off());
         let angles = unknowns::angles(&self.walker.gait, &unknowns.whole, &unknowns.frames[frame]);
         let mut all = Vec::new();
@@ -147,7 +149,7 @@ impl Problem<'_> {
                 }
             }
             let [sd, most] =
-                [SD_FACTOR * fitted.solution.variance(&whole, &frames).sqrt(), MOST_SD_RAD[at % JOINTS]];
+                [SD_FACTOR * covariance.variance(&whole, &frames).sqrt(), MOST_SD_RAD[at % JOINTS]];
             let sd = sd.hypot(MODEL_SD_RAD[at % JOINTS]).hypot(OFF_SD_RAD * off);
             (sd <= most).then_some([angles[at], sd])
         };
@@ -155,13 +157,13 @@ impl Problem<'_> {
     }
 
     /// Standard deviations of the torso's centre along, across and up, and of the phase.
-    fn place_sd(&self, fitted: &Fitted, frame: usize) -> [f64; 4] {
+    fn place_sd(&self, fitted: &Fitted, covariance: &Covariance, frame: usize) -> [f64; 4] {
         let (height_m, lean) = (self.walker.body.height_m, fitted.unknowns.whole[WHOLE_LEAN]);
         let half_m = 0.5 * body(&self.walker.body, &fitted.unknowns.whole).torso_length_m();
         let along_m = fitted.unknowns.frames[frame][FRAME_ALONG];
         let at = |unknown: usize| [(frame * FRAME + unknown, 1.0)];
         let sd = |whole: &[(usize, f64)], frames: &[(usize, f64)], common: f64| {
-            (SD_FACTOR * fitted.solution.variance(whole, frames).sqrt()).hypot(common)
+            (SD_FACTOR * covariance.variance(whole, frames).sqrt()).hypot(common)
         };
         let half_torso = 0.5 * height_m;
         let mut across = vec![(WHOLE_ACROSS, 1.0), (WHOLE_HEADING, along_m)];
