@@ -345,7 +345,6 @@ fn followed(options: ClothedOptions) -> (Followed, Vec<usize>) {
     (Followed { seed, scene, walks }, frames)
 }
 
-/// Someone who turns is followed along a curve, with the heading of every frame.
 /// Somebody who stands still for three seconds in the middle of the picture.
 #[test]
 fn who_stops_and_goes_on_is_one_person_with_two_walks() {
@@ -374,6 +373,7 @@ fn who_stops_and_goes_on_is_one_person_with_two_walks() {
     assert!(10 * one >= 9 * all, "{one} of {all}");
 }
 
+/// Someone who turns is followed along a curve, with the heading of every frame.
 #[test]
 fn a_walk_that_turns_is_followed_round_its_curve() {
     for (seed, turn_rad) in [(8, -1.4), (3, 1.1)].into_iter().take(many(1) as usize) {

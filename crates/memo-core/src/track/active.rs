@@ -32,6 +32,9 @@ const LEAVING_MPS: f64 = 0.7;
 /// Number of last frames that decide whether a walk continues.
 const RECENT_FRAMES: usize = 12;
 
+/// Of a walk, at most this share of the frames may show no change where the model walks. Of 40 drawn people who walk, none
+/// shows one before the end; of one who stood and waved, taken for a walker before, 15 of 25.
+const MOST_EMPTY: f64 = 0.25;
 /// So many last frames without the person are removed; a single one may only be matched badly.
 const LEAST_GONE: usize = 3;
 
@@ -48,6 +51,15 @@ fn changing(steps: &[Step]) -> Option<f32> {
     let visible: f32 = known().map(|(visible, _)| visible).sum();
     let changing: f32 = known().map(|(visible, changing)| visible * changing).sum();
     (visible >= DECIDING_SHARE * steps.len() as f32).then(|| changing / visible)
+}
+
+/// True if somebody is in most frames of which the changes are known: a model that found somebody else later was lost.
+fn is_somebody_there(steps: &[Step]) -> bool {
+    let least = least_changing(steps);
+    let known: Vec<f32> =
+        steps.iter().filter(|s| s.visible >= DECIDING_SHARE).filter_map(|s| s.changing).collect();
+    let empty = known.iter().filter(|&&changing| changing < least).count();
+    empty as f64 <= MOST_EMPTY * known.len() as f64
 }
 
 /// Nobody is where less than this share of the image about the model changes: much less than usually.
@@ -233,7 +245,8 @@ impl Active {
         let [Some(best), Some(other)] = twins else { return None };
         let [low, high] = body_box(&self.camera, &self.body()?)?;
         let scene = self.scene(best.state.along.position);
-        Some(expected(&scene, [&best.state, &other.state], best.look.window, high.y - low.y))
+        let twins = [best, other].map(|step| step.state.hypothesis());
+        Some(expected(&scene, twins, best.look.window, high.y - low.y))
     }
 
     /// True if in the last frames the person stood still or the model matched little.
@@ -274,8 +287,8 @@ impl Active {
         covered_m.abs() >= SLOWEST_MPS * (last.time_s - first.time_s)
     }
 
-    /// True if the moving thing walked: over all frames it moved on, and its displacement per cycle is possible
-    /// for legs of its height.
+    /// True if the moving thing walked: over all frames it moved on where something changes, and its displacement per
+    /// cycle is possible for legs of its height.
     ///
     /// Swinging arms and carried things can look like a walker for half a second, but then the legs of the model
     /// do not fit the displacement.
@@ -289,7 +302,8 @@ impl Active {
             return cycles >= SLOWEST_HZ * elapsed_s;
         }
         let stride = covered_m / cycles / self.walk.walker.body.height_m;
-        covered_m.abs() >= SLOWEST_MPS * elapsed_s
+        is_somebody_there(&twin.steps)
+            && covered_m.abs() >= SLOWEST_MPS * elapsed_s
             && cycles.abs() >= SLOWEST_HZ * elapsed_s
             && STRIDE_HEIGHTS.contains(&stride)
     }
@@ -741,6 +755,23 @@ pub(super) mod tests {
             assert_eq!(steady(speed_mps, rate_hz).is_walk(), is_walk, "{speed_mps} m/s, {rate_hz} Hz");
         }
         assert!(!active(Vec::new()).is_walk(), "without a frame");
+    }
+
+    /// Somebody stands and swings the arms, and the model walks away and comes back.
+    #[test]
+    fn a_model_that_walks_where_nothing_changes_is_no_walk() {
+        let walk = |away: usize, visible: f32| {
+            let mut walk = steady(1.2, 0.9);
+            for step in walk.walk.twins.iter_mut().flat_map(|twin| &mut twin.steps) {
+                step.visible = visible;
+                // What changed before the walk started is not known.
+                step.changing = (step.frame >= 12).then_some(if step.frame < 12 + away { 0.0 } else { 0.5 });
+            }
+            walk
+        };
+        assert!(walk(0, 1.0).is_walk() && walk(7, 1.0).is_walk());
+        assert!(!walk(8, 1.0).is_walk() && !walk(14, 1.0).is_walk());
+        assert!(walk(14, 0.3).is_walk(), "of who is hidden it says nothing");
     }
 
     fn frames(active: &Active) -> (usize, usize) {

@@ -11,7 +11,7 @@
 
 use super::active::Active;
 use super::candidate::{MISSED_FRAMES, Seen};
-use super::crowd::{Expected, body_box, keep_unowned};
+use super::crowd::{Expected, body_box, expected, keep_unowned};
 use super::decisions::{DECIDING_SHARE, LOST_SHARE};
 use super::fit::views::Piece;
 use super::options::TrackerOptions;
@@ -90,16 +90,9 @@ impl<'a> Beside<'a> {
         };
         let path = self.walk.route.at(place.along_m);
         let scene = Scene::new(&self.walk.walker, self.camera, &path);
-        let body = scene.pose(&place);
-        let [low, high] = body_box(self.camera, &body.cylinders)?;
+        let [low, high] = body_box(self.camera, &scene.pose(&place).cylinders)?;
         let other = Hypothesis { phase: place.phase + 0.5, ..place };
-        Some(Expected {
-            window,
-            height_px: high.y - low.y,
-            distance_m: body.torso_centre.distance(self.camera.position()),
-            lines: [place, other].iter().flat_map(|twin| scene.lines(twin)).collect(),
-            body: body.cylinders,
-        })
+        Some(expected(&scene, [place, other], window, high.y - low.y))
     }
 }
 

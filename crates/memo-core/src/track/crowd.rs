@@ -8,8 +8,7 @@
 
 use super::decisions::{EXPLAINED, NEARER, OWNED, TURNED};
 use super::score::{EdgeLine, ModelLine};
-use super::search::Scene;
-use super::walk::State;
+use super::search::{Hypothesis, Scene};
 use crate::image::{Mask, Rectangle};
 use crate::model::body::PART_COUNT;
 use crate::model::{Camera, EllipticCylinder};
@@ -46,10 +45,15 @@ impl Expected {
     }
 }
 
-/// Contours, window and body of a person at a predicted state. The edges of both twins are the person's own.
-pub(super) fn expected(scene: &Scene<'_>, twins: [&State; 2], window: Rectangle, height_px: f64) -> Expected {
-    let body = scene.pose(&twins[0].hypothesis());
-    let lines = twins.iter().flat_map(|state| scene.lines(&state.hypothesis())).collect();
+/// Contours, window and body of a person at a place. The edges of both twins are the person's own.
+pub(super) fn expected(
+    scene: &Scene<'_>,
+    twins: [Hypothesis; 2],
+    window: Rectangle,
+    height_px: f64,
+) -> Expected {
+    let body = scene.pose(&twins[0]);
+    let lines = twins.iter().flat_map(|twin| scene.lines(twin)).collect();
     let distance_m = body.torso_centre.distance(scene.camera.position());
     Expected { window, height_px, distance_m, lines, body: body.cylinders }
 }
@@ -177,8 +181,8 @@ pub(super) fn body_box(camera: &Camera, body: &[EllipticCylinder]) -> Option<[DV
 
 #[cfg(test)]
 mod tests {
+    use super::super::search::Path;
     use super::super::search::tests::{camera, walker};
-    use super::super::search::{Hypothesis, Path};
     use super::*;
     use crate::image::Image;
 

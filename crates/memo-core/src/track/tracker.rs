@@ -424,7 +424,8 @@ impl Tracker {
             right: high_in.x as usize,
             bottom: high_in.y as usize,
         };
-        Some(expected(&scene, [&predicted, &other], window, high.y - low.y))
+        let twins = [predicted.hypothesis(), other.hypothesis()];
+        Some(expected(&scene, twins, window, high.y - low.y))
     }
 
     /// Follows everybody into a frame.
