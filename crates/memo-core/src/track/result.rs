@@ -122,12 +122,14 @@ impl TrackedWalk {
         self.fit.as_ref()?.as_ref().ok()
     }
 
-    /// Probability that left and right are swapped in the whole walk: of the fit, or of the twins' similarities.
+    /// Probability that left and right are swapped in the whole walk: of the fit, or of the twins' similarities. A model
+    /// that is not on the person does not show it, and neither do the feet of somebody who walks along the line of sight.
     pub fn p_swapped(&self) -> f64 {
-        match self.fitted() {
-            Some(fit) => fit.p_swapped,
-            None if self.is_frontal => 0.5,
-            None => self.walk.swap_probability(&self.options.swap),
+        match &self.fit {
+            Some(Ok(fit)) => fit.p_swapped,
+            Some(Err(FitError::Misfit { .. })) => 0.5,
+            _ if self.is_frontal => 0.5,
+            _ => self.walk.swap_probability(&self.options.swap),
         }
     }
 

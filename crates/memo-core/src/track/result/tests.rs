@@ -402,3 +402,17 @@ fn a_walk_that_fits_poorly_is_a_double_also_where_it_is_smaller() {
     assert_eq!(are(&smaller(poor(beside(-0.5, 0, 50))), &good(short.clone())), [false, true]);
     assert_eq!(are(&poor(long), &good(short)), [true, false]);
 }
+
+/// The twins' similarities tell the sides of a model that is on the person only.
+#[test]
+fn a_model_that_does_not_fit_leaves_the_sides_open() {
+    let walk = |fit: Option<FitError>| {
+        let walk = followed(ACROSS, &exact(&uneven_s(40)), WalkOptions::default());
+        TrackedWalk { fit: fit.map(Err), ..walk }
+    };
+    let [unfitted, short] = [None, Some(FitError::TooFewFrames { got: 3 })].map(|fit| walk(fit).p_swapped());
+    assert!(unfitted < 0.49 && short == unfitted, "{unfitted} {short}");
+    let off = walk(Some(FitError::Misfit { missed: 0.43, residual: 0.014 }));
+    assert_eq!(off.p_swapped(), 0.5);
+    assert!(off.rows().iter().all(|row| row.p_swapped == 0.5));
+}
