@@ -74,13 +74,13 @@ pub(super) struct Beside<'a> {
 
 impl<'a> Beside<'a> {
     pub fn new(walk: &'a Walk, camera: &'a Camera, options: &TrackerOptions) -> Option<Self> {
-        let steps = &walk.twins[walk.best()].steps;
+        let steps = walk.steps();
         (!steps.is_empty()).then(|| Self { walk, camera, lead: Lead::of(steps, options) })
     }
 
     /// The person in a frame; `None` after the walk, or if nothing of the person is before the camera.
     fn in_frame(&self, seen: &Seen) -> Option<Expected> {
-        let steps = &self.walk.twins[self.walk.best()].steps;
+        let steps = self.walk.steps();
         let FrameEdges { frame, time_s, window, .. } = seen.edges;
         let after = steps.partition_point(|step| step.frame < frame);
         let place = match steps.get(after)? {
@@ -108,8 +108,7 @@ impl Active {
         let lead = Lead::of(self.steps(), options);
         let before: Vec<Seen> = before.iter().map(|seen| self.behind(beside, &lead, seen)).collect();
         let sum = |walk: &Walk, from: usize| -> f64 {
-            let steps = &walk.twins[walk.best()].steps[from..];
-            steps.iter().map(|step| f64::from(step.similarity * step.visible)).sum()
+            walk.steps()[from..].iter().map(|step| f64::from(step.similarity * step.visible)).sum()
         };
         let least = LOST_SHARE * sum(&self.walk, 0) / self.steps().len() as f64;
         // 2. The frames that show the person there, the latest first.
@@ -147,10 +146,9 @@ impl Active {
         let Some(beginning) = beginning else { return };
         added.reverse();
         // 3. All frames from there on.
-        let mut walk = Walk::new(self.walk.walker.clone(), self.walk.route.clone(), beginning);
-        for edges in added.iter().map(|seen| &seen.edges).chain(self.kept.iter().map(|(_, edges)| edges)) {
-            walk.follow(edges, &self.camera, &options.walk);
-        }
+        let frames = added.iter().map(|seen| &seen.edges).chain(self.kept.iter().map(|(_, edges)| edges));
+        let walk = Walk::new(self.walk.walker.clone(), self.walk.route.clone(), beginning);
+        let walk = walk.through(frames, &self.camera, &options.walk);
         if sum(&walk, added.len()) < (1.0 - MOST_LOST) * sum(&self.walk, 0) {
             return;
         }
@@ -228,10 +226,8 @@ mod tests {
             phase: BEGINNING.phase + BEGINNING.rate_hz * time_s,
             ..BEGINNING
         };
-        active.walk = Walk::new(active.walk.walker.clone(), PATH, beginning);
-        for (_, edges) in &kept {
-            active.walk.follow(edges, &active.camera, &options().walk);
-        }
+        let walk = Walk::new(active.walk.walker.clone(), PATH, beginning);
+        active.walk = walk.through(kept.iter().map(|(_, edges)| edges), &active.camera, &options().walk);
         active.kept = kept;
         let seen = |(sighting, edges): (Option<_>, FrameEdges)| Seen {
             sighting: sighting.unwrap(),

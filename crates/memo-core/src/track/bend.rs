@@ -145,8 +145,7 @@ impl Active {
         let (walk, frontal) = self.on_route(&curved, before, options);
         // 4. The more similar of the two.
         let latest = |walk: &Walk| -> f64 {
-            let steps = &walk.twins[walk.best()].steps;
-            steps[before..].iter().map(|step| f64::from(step.similarity * step.visible)).sum()
+            walk.steps()[before..].iter().map(|step| f64::from(step.similarity * step.visible)).sum()
         };
         let is_more_similar = latest(&walk) > (1.0 + self.least_gain(when, is_clear)) * latest(&self.walk);
         // The rectangles of who stops go anywhere, as changes vanish, but then the contours do not follow them.
@@ -165,7 +164,7 @@ impl Active {
     /// Log odds of the same walk on another route: where contours show the walk, by the similarities, and where the feet
     /// show it, by the rectangles.
     fn log_odds_of(&self, other: &Walk, trail: &Trail, options: &TrackerOptions) -> f64 {
-        let [here, there] = [&self.walk, other].map(|walk| &walk.twins[walk.best()].steps);
+        let [here, there] = [&self.walk, other].map(Walk::steps);
         let (mut similarity, mut lasts_s, mut odds) = ([0.0; 2], 0.0, 0.0);
         for (k, (a, b)) in here.iter().zip(there).enumerate() {
             if a.by_feet || b.by_feet {

@@ -132,10 +132,8 @@ impl Candidate {
             return Err(Reason::OverGround { speed_mps: course.speed_mps });
         }
         let Started { camera, course, walker, start } = self.started_any_way(&sightings, given, &height)?;
-        let mut walk = Walk::new(walker.clone(), start.path, start.beginning);
-        for seen in &self.seen {
-            walk.follow(&seen.edges, &camera, &options.walk);
-        }
+        let walk = Walk::new(walker.clone(), start.path, start.beginning);
+        let walk = walk.through(self.seen.iter().map(|seen| &seen.edges), &camera, &options.walk);
         Ok(Active {
             person: 0,
             started_near: false,

@@ -44,7 +44,7 @@ impl WalkRatio {
 impl Walk {
     /// The walk ratio of what was followed so far, of a person of this height, metres; `None` of a single frame.
     pub(super) fn ratio(&self, height_m: f64) -> Option<WalkRatio> {
-        let steps = &self.twins[self.best()].steps;
+        let steps = self.steps();
         let (first, last) = (steps.first()?, steps.last()?);
         let elapsed_s = last.time_s - first.time_s;
         let covered_m = (last.state.along.position - first.state.along.position).abs();

@@ -177,7 +177,7 @@ impl TrackedWalk {
 
     /// Steps of the better twin: measurements and filtered states.
     pub fn steps(&self) -> &[Step] {
-        &self.walk.twins[self.walk.best()].steps
+        self.walk.steps()
     }
 
     /// True if the walk is a second model of the person of another walk, and this is the one to withdraw: their bodies lie

@@ -26,10 +26,9 @@ impl Active {
             return;
         }
         let starts = SMALLER_STEPS.into_iter().filter_map(|style| self.started_with(style, kept, options));
-        let summed = |walk: &Walk| walk.twins[walk.best()].similarity_sum;
         let best = starts
             .filter(|(start, walk)| start.frozen.similarity < start.lines.best.similarity && !stalls(walk))
-            .max_by(|a, b| summed(&a.1).total_cmp(&summed(&b.1)));
+            .max_by(|a, b| a.1.similarity_sum().total_cmp(&b.1.similarity_sum()));
         if let Some((start, walk)) = best {
             (self.start, self.walk) = (start, walk);
         }
@@ -48,17 +47,15 @@ impl Active {
         let crown = Crown { height_m: walker.level_crown_height_m(), sd_m: self.height.sd_in_camera_m() };
         let course = locate(&sightings, &self.camera, &crown).ok()?;
         let start = start(&frames, &course, &walker, &self.camera, &options.cadence, &options.walk)?;
-        let mut walk = Walk::new(walker, start.path, start.beginning);
-        for (_, edges) in kept {
-            walk.follow(edges, &self.camera, &options.walk);
-        }
+        let walk = Walk::new(walker, start.path, start.beginning);
+        let walk = walk.through(kept.iter().map(|(_, edges)| edges), &self.camera, &options.walk);
         Some((start, walk))
     }
 }
 
 /// True if the phase stands still in the last frames.
 fn stalls(walk: &Walk) -> bool {
-    let steps = &walk.twins[walk.best()].steps;
+    let steps = walk.steps();
     let Some(first) = steps.len().checked_sub(LAST_FRAMES).map(|k| &steps[k]) else { return false };
     let last = &steps[steps.len() - 1];
     let cycles = (last.state.phase.position - first.state.phase.position).abs();
@@ -116,7 +113,7 @@ mod tests {
         let walk = &person.walk;
         assert_eq!(walk.walker.style, GaitStyle::SHUFFLING);
         assert!((person.start.lines.best.rate_hz - RATE_HZ).abs() < 0.05);
-        for step in &walk.twins[walk.best()].steps[20..] {
+        for step in &walk.steps()[20..] {
             let off = step.state.phase.position - phase(step.frame);
             // The two half-cycle twins look almost alike.
             assert!((2.0 * off - (2.0 * off).round()).abs() < 0.1, "frame {}: {off}", step.frame);

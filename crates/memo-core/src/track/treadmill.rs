@@ -109,10 +109,8 @@ impl Spot<'_> {
         let frames: Vec<&FrameEdges> = standing.kept.iter().map(|(_, edges)| edges).step_by(EVERY).collect();
         let Some(start) = self.start(&frames) else { return Err(standing) };
         let Self { camera, tilt, course, height, walker, options, .. } = self;
-        let mut walk = Walk::new(walker.clone(), start.path, start.beginning);
-        for (_, edges) in &standing.kept {
-            walk.follow(edges, camera, &options.walk);
-        }
+        let walk = Walk::new(walker.clone(), start.path, start.beginning);
+        let walk = walk.through(standing.kept.iter().map(|(_, edges)| edges), camera, &options.walk);
         Ok(Active {
             person: 0,
             started_near: false,

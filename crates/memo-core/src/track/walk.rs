@@ -246,6 +246,19 @@ impl Walk {
         }
     }
 
+    /// The walk after these frames.
+    pub fn through<'a>(
+        mut self,
+        frames: impl IntoIterator<Item = &'a FrameEdges>,
+        camera: &Camera,
+        options: &WalkOptions,
+    ) -> Self {
+        for edges in frames {
+            self.follow(edges, camera, options);
+        }
+        self
+    }
+
     /// Follows both twins into a frame.
     pub fn follow(&mut self, edges: &FrameEdges, camera: &Camera, options: &WalkOptions) {
         let others = Others::new(&edges.others, camera.position());
@@ -302,9 +315,24 @@ impl Walk {
         usize::from(self.twins[1].similarity_sum > self.twins[0].similarity_sum)
     }
 
+    /// The better twin.
+    pub fn best_twin(&self) -> &Twin {
+        &self.twins[self.best()]
+    }
+
+    /// The frames of the better twin.
+    pub fn steps(&self) -> &[Step] {
+        &self.best_twin().steps
+    }
+
+    /// Sum of the better twin's similarities.
+    pub fn similarity_sum(&self) -> f64 {
+        self.best_twin().similarity_sum
+    }
+
     /// Mean share of the person that nobody else hid, 0 to 1.
     pub fn visible_share(&self) -> f64 {
-        let twin = &self.twins[self.best()];
+        let twin = self.best_twin();
         if twin.frame_count == 0 { 1.0 } else { twin.visible_sum / twin.frame_count as f64 }
     }
 
@@ -344,7 +372,7 @@ impl Walk {
 
     /// The last step of the best twin.
     pub fn last(&self) -> Option<&Step> {
-        self.twins[self.best()].steps.last()
+        self.steps().last()
     }
 }
 
@@ -384,7 +412,7 @@ fn match_frame(edges: &FrameEdges, scene: &Scene<'_>, predicted: &State, options
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::super::search::tests::{camera, edges_of, walker};
     use super::*;
     use glam::DVec2;
@@ -459,29 +487,35 @@ mod tests {
         State { along: of(along), height: of(height), phase: of(phase) }
     }
 
-    /// A step that was measured as predicted.
-    fn step(time_s: f64, similarity: f32) -> Step {
-        let measured = truth(time_s);
-        let state = State {
-            along: ConstantVelocity::new(measured.along_m, 1.3, 0.01, 0.01),
-            height: ConstantVelocity::new(measured.height_m, 0.0, 1e-4, 0.0),
-            phase: ConstantVelocity::new(measured.phase, 0.9, 0.01, 0.01),
-        };
-        let alongs = Axis::around(measured.along_m, 0.1, 0.02);
-        let heights = Axis::around(1.0, 0.1, 0.02);
-        let look = Look { window: WINDOW, alongs, heights, best: measured, path: PATH };
+    /// A step that was measured as its state says, of a person who is wholly visible.
+    pub fn step_in(frame: usize, time_s: f64, state: State) -> Step {
+        let best = state.hypothesis();
+        let (alongs, heights) =
+            (Axis::around(best.along_m, 0.1, 0.02), Axis::around(best.height_m, 0.1, 0.02));
+        let look = Look { window: WINDOW, alongs, heights, best, path: PATH };
         Step {
-            frame: 0,
+            frame,
             time_s,
             state,
-            measured: Some(measured),
-            similarity,
+            measured: Some(best),
+            similarity: 0.5,
             visible: 1.0,
             changing: None,
             shared: false,
             by_feet: false,
             look,
         }
+    }
+
+    /// A step of the planted walker.
+    fn step(time_s: f64, similarity: f32) -> Step {
+        let Hypothesis { along_m, height_m, phase } = truth(time_s);
+        let state = State {
+            along: ConstantVelocity::new(along_m, 1.3, 0.01, 0.01),
+            height: ConstantVelocity::new(height_m, 0.0, 1e-4, 0.0),
+            phase: ConstantVelocity::new(phase, 0.9, 0.01, 0.01),
+        };
+        Step { similarity, ..step_in(0, time_s, state) }
     }
 
     #[test]

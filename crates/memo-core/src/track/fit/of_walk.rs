@@ -141,7 +141,7 @@ impl Tracked<'_> {
     }
 
     fn steps(&self) -> &[Step] {
-        &self.walk.twins[self.walk.best()].steps
+        self.walk.steps()
     }
 
     /// Where the first and the last frame are along the route.

@@ -1,13 +1,13 @@
 use super::super::fit::FitError;
 use super::super::result;
 use super::super::search::tests::walker;
-use super::super::search::{Axis, Hypothesis, Path};
+use super::super::search::{Hypothesis, Path};
 use super::super::start::tests::report;
+use super::super::walk::tests::step_in;
 use super::super::walk::{Beginning, Look, State, Walk, WalkOptions};
 use super::*;
 use crate::calibrate::tilt_of_lines;
 use crate::estimate::kalman::ConstantVelocity;
-use crate::image::Rectangle;
 use crate::synth::Random;
 use glam::DVec2;
 use std::collections::BTreeMap;
@@ -91,21 +91,9 @@ fn tracked(measured: &[Measured], path: Path, direction: Direction) -> TrackedWa
         state.along = state.along.update(along_m, &options.filter.along);
         state.phase = state.phase.update(phase, &options.filter.phase);
         let hypothesis = Hypothesis { along_m, height_m: 1.15, phase: phase.rem_euclid(1.0) };
-        let window = Rectangle { left: 0, top: 0, right: 9, bottom: 9 };
-        let alongs = Axis::around(hypothesis.along_m, 0.1, 0.02);
-        let look = Look { window, alongs, heights: Axis::around(1.15, 0.1, 0.02), best: hypothesis, path };
-        Step {
-            frame,
-            time_s,
-            state,
-            measured: Some(hypothesis),
-            similarity: 0.5,
-            visible: 1.0,
-            changing: None,
-            shared: false,
-            by_feet: false,
-            look,
-        }
+        let as_filtered = step_in(frame, time_s, state);
+        let look = Look { best: hypothesis, path, ..as_filtered.look };
+        Step { measured: Some(hypothesis), look, ..as_filtered }
     };
     let mut walk = Walk::new(walker(), path, beginning);
     walk.twins[0].steps = measured.iter().enumerate().map(step).collect();

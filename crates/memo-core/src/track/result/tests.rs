@@ -1,10 +1,10 @@
+use super::super::search::Path;
 use super::super::search::tests::{camera, walker};
-use super::super::search::{Axis, Path};
 use super::super::start::tests::report;
+use super::super::walk::tests::step_in;
 use super::super::walk::{Beginning, Look, State};
 use super::*;
 use crate::estimate::kalman::FilterOptions;
-use crate::image::Rectangle;
 use crate::model::Body;
 use crate::synth::Random;
 use crate::track::fit::FitQuality;
@@ -39,26 +39,9 @@ fn followed(path: Path, frames: &[(f64, Option<Hypothesis>)], options: WalkOptio
             };
         }
         let measured = seen.map(|h| Hypothesis { phase: h.phase.rem_euclid(1.0), ..h });
-        let look = Look {
-            window: Rectangle { left: 0, top: 0, right: 9, bottom: 9 },
-            alongs: Axis::around(state.along.position, 0.1, 0.02),
-            heights: Axis::around(1.0, 0.1, 0.02),
-            best: state.hypothesis(),
-            path,
-        };
         let similarity = if seen.is_some() { 0.5 } else { 0.0 };
-        Step {
-            frame: 5 + 2 * frame,
-            time_s: *time_s,
-            state,
-            measured,
-            similarity,
-            visible: 1.0,
-            changing: None,
-            shared: false,
-            by_feet: false,
-            look,
-        }
+        let as_filtered = step_in(5 + 2 * frame, *time_s, state);
+        Step { measured, similarity, look: Look { path, ..as_filtered.look }, ..as_filtered }
     };
     let steps: Vec<Step> = frames.iter().enumerate().map(step).collect();
     let mut walk = Walk::new(walker(), path, beginning);

@@ -1,12 +1,14 @@
 //! Decisions of the tracker, on moving boxes and on walks put into it; no frame is drawn.
 
+use super::super::active::tests::active;
 use super::super::candidate::tests::seen_walking;
 use super::super::height::BodyHeight;
 use super::super::search::tests::{camera, rectangle_of, walker};
-use super::super::search::{Axis, Hypothesis, Path, Scene};
+use super::super::search::{Hypothesis, Path, Scene};
 use super::super::start::Direction;
 use super::super::start::tests::report;
-use super::super::walk::{Beginning, Look, State, Step, Walk};
+use super::super::walk::tests::step_in;
+use super::super::walk::{Beginning, State, Step};
 use super::*;
 use crate::calibrate::tilt_of_lines;
 use crate::estimate::kalman::ConstantVelocity;
@@ -258,57 +260,20 @@ fn step(frame: usize, along_m: f64, speed_mps: f64) -> Step {
         height: ConstantVelocity::new(height_m, 0.0, 1e-4, 0.0),
         phase: ConstantVelocity::new(0.2 + 0.9 * time_s, 0.9, 1e-4, 1e-3),
     };
-    let best = state.hypothesis();
-    let look = Look {
-        window: boxed(100, 399, 80, 200),
-        alongs: Axis::around(along_m, 0.1, 0.02),
-        heights: Axis::around(height_m, 0.1, 0.02),
-        best,
-        path: PATH,
-    };
-    Step {
-        frame,
-        time_s,
-        state,
-        measured: Some(best),
-        similarity: 0.5,
-        visible: 1.0,
-        changing: None,
-        shared: false,
-        by_feet: false,
-        look,
-    }
+    step_in(frame, time_s, state)
 }
 
 /// A tracker that has followed a person through `count` frames; the person is now at x metres.
 fn following(count: usize, along_m: f64, speed_mps: f64) -> Tracker {
     let mut tracker = tracker();
-    let mut walk = Walk::new(walker(), PATH, BEGINNING);
     let steps = (0..count).map(|k| step(k, along_m - 0.04 * speed_mps * (count - 1 - k) as f64, speed_mps));
-    walk.twins[0].steps = steps.collect();
-    walk.twins[1].steps = walk.twins[0].steps.clone();
-    walk.twins[0].similarity_sum = 0.5 * count as f64;
-    walk.twins[0].visible_sum = count as f64;
+    let mut followed = active(steps.collect());
+    followed.walk.beginning = BEGINNING;
     tracker.people.push(Active {
-        person: 0,
-        started_near: false,
-        height: super::super::height::BodyHeight::given(1.75),
-        camera: camera(),
-        tilt: None,
-        depth_sd_m: 0.1,
         start: report(PATH, BEGINNING, Direction::Forward),
-        walk,
-        kept: Vec::new(),
         gait_speed_mps: 1.25,
-        average: walker(),
         settled: true,
-        pieces: Vec::new(),
-        is_on_treadmill: false,
-        early: None,
-        feet: BTreeMap::new(),
-        earlier: Standing::default(),
-        before: Vec::new(),
-        frontal: None,
+        ..followed
     });
     tracker
 }
