@@ -103,8 +103,13 @@ impl Sides {
         self.shared_area(other) / self.area().min(other.area())
     }
 
+    /// Distance of the upper side from the lower one.
+    pub fn height(&self) -> f64 {
+        self.bottom - self.top
+    }
+
     fn area(&self) -> f64 {
-        (self.right - self.left) * (self.bottom - self.top)
+        (self.right - self.left) * self.height()
     }
 
     fn shared_area(&self, other: &Self) -> f64 {

@@ -19,8 +19,8 @@ use super::walk::{FrameEdges, Step, Walk};
 use crate::calibrate::TiltEstimate;
 use crate::image::Sides;
 use crate::model::body::PART_COUNT;
-use crate::model::{Camera, EllipticCylinder, Walker};
-use glam::DVec3;
+use crate::model::{Camera, EllipticCylinder, GaitStyle, Walker};
+use glam::{DVec2, DVec3};
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::sync::Arc;
 
@@ -32,6 +32,8 @@ pub(super) type Kept = [(Option<Sighting>, FrameEdges)];
 pub(super) struct Active {
     /// Number of the person, in order of appearance.
     pub(super) person: usize,
+    /// The frame in which the walk was started; `None` if it goes on from an earlier one.
+    pub(super) started_frame: Option<usize>,
     /// Whether somebody was followed when the walk started.
     pub(super) started_near: bool,
     pub(super) camera: Camera,
@@ -66,6 +68,32 @@ pub(super) struct Active {
 }
 
 impl Active {
+    /// A walk at its beginning, of a body height, in a camera.
+    pub(super) fn new(walk: Walk, start: StartReport, camera: Camera, height: BodyHeight) -> Self {
+        Self {
+            person: 0,
+            started_frame: None,
+            started_near: false,
+            camera,
+            tilt: None,
+            height,
+            depth_sd_m: 0.0,
+            average: Walker { style: GaitStyle::default(), ..walk.walker.clone() },
+            gait_speed_mps: walk.beginning.speed_mps,
+            start,
+            walk,
+            kept: Vec::new(),
+            settled: false,
+            pieces: Vec::new(),
+            is_on_treadmill: false,
+            early: None,
+            feet: BTreeMap::new(),
+            earlier: Standing::default(),
+            before: Vec::new(),
+            frontal: None,
+        }
+    }
+
     /// The filtered state of the better twin.
     pub(super) fn now(&self, options: &TrackerOptions) -> Option<Now> {
         let step = self.walk.last()?;
@@ -112,8 +140,7 @@ impl Active {
     fn box_in(&self, step: &Step) -> Option<Sides> {
         let hypothesis = step.state.hypothesis();
         let body = self.scene(hypothesis.along_m).pose(&hypothesis).cylinders;
-        let [low, high] = body_box(&self.camera, &body)?;
-        Some(Sides { left: low.x, top: low.y, right: high.x, bottom: high.y })
+        body_box(&self.camera, &body)
     }
 
     /// The body in the last frame.
@@ -144,29 +171,31 @@ impl Active {
 
     /// Drops the frames from a time on.
     pub(super) fn end_before(&mut self, time_s: f64) {
-        self.walk.keep(0..self.frames_before(time_s));
+        let first = self.steps().get(self.frames_before(time_s)).map(|step| step.frame);
+        first.into_iter().for_each(|frame| self.drop_from(frame));
     }
 
     /// Where the person was and went in a frame.
     pub(super) fn sign_at(&self, index: usize) -> Option<Sign> {
         let step = self.steps().get(index)?;
         let path = self.walk.route.at(step.state.along.position);
-        Some(Sign {
-            time_s: step.time_s,
-            place_m: path.point(step.state.along.position, 0.0).truncate(),
-            velocity_mps: step.state.along.velocity * path.direction(),
-            stands: false,
-        })
+        let speed_mps = step.state.along.velocity;
+        let (velocity_mps, way) = match self.is_on_treadmill {
+            true => (DVec2::ZERO, path.direction()),
+            false => (speed_mps * path.direction(), speed_mps.signum() * path.direction()),
+        };
+        let place_m = path.point(step.state.along.position, 0.0).truncate();
+        Some(Sign { time_s: step.time_s, place_m, velocity_mps, way, stands: false })
     }
 
     /// The person as followed in the last frame.
     pub(super) fn as_followed(&self) -> Option<Expected> {
         let twins = [self.walk.best(), 1 - self.walk.best()].map(|twin| self.walk.twins[twin].steps.last());
         let [Some(best), Some(other)] = twins else { return None };
-        let [low, high] = body_box(&self.camera, &self.body()?)?;
+        let height_px = body_box(&self.camera, &self.body()?)?.height();
         let scene = self.scene(best.state.along.position);
         let twins = [best, other].map(|step| step.state.hypothesis());
-        Some(expected(&scene, twins, best.look.window, high.y - low.y))
+        Some(expected(&scene, twins, best.look.window, height_px))
     }
 
     /// Drops the frames from this one on.
@@ -175,6 +204,7 @@ impl Active {
         let end = steps.partition_point(|step| step.frame < frame);
         self.walk.keep(0..end);
         self.kept.retain(|(_, edges)| edges.frame < frame);
+        self.frontal.iter_mut().for_each(|frontal| frontal.paces.truncate(end));
     }
 
     /// The rotations of the camera in the frames of the walk; none if it stood still in all of them.
@@ -285,27 +315,8 @@ pub(super) mod tests {
         walk.twins[0].frame_count = steps.len();
         walk.twins[0].steps = steps;
         walk.twins[1].steps = walk.twins[0].steps.clone();
-        Active {
-            camera: camera(),
-            tilt: None,
-            height: BodyHeight::given(1.75),
-            depth_sd_m: 0.1,
-            start: report(PATH, BEGINNING, Direction::Forward),
-            walk,
-            average: walker(),
-            person: 0,
-            started_near: false,
-            kept: Vec::new(),
-            gait_speed_mps: 1.2,
-            settled: false,
-            pieces: Vec::new(),
-            is_on_treadmill: false,
-            early: None,
-            feet: BTreeMap::new(),
-            earlier: Standing::default(),
-            before: Vec::new(),
-            frontal: None,
-        }
+        let start = report(PATH, BEGINNING, Direction::Forward);
+        Active { depth_sd_m: 0.1, ..Active::new(walk, start, camera(), BodyHeight::given(1.75)) }
     }
 
     /// A step with this similarity at a position and phase.
@@ -335,6 +346,16 @@ pub(super) mod tests {
         for (k, frame) in frames.iter().enumerate() {
             assert_eq!(frame.visible, k as f64 / 64.0);
         }
+    }
+
+    #[test]
+    fn a_walk_that_ends_earlier_keeps_no_later_frames() {
+        let mut walk = active((0..20).map(|k| step(k, [0.06 * k as f64, 0.045 * k as f64], 0.5)).collect());
+        walk.kept = frames_on(20, FRAME_S, &PATH.into(), &PATH.into());
+        walk.frontal = Some(walk.recorded());
+        walk.end_before(FRAME_S * 12.0 - 1e-6);
+        assert_eq!((walk.steps().len(), walk.kept.len()), (12, 12));
+        assert_eq!(walk.frontal.map(|frontal| frontal.paces.len()), Some(12));
     }
 
     #[test]

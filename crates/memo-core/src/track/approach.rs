@@ -29,29 +29,16 @@ impl Approach<'_> {
         };
         let beginning = frontal.beginning();
         let Some(start) = self.report(&standing, &frontal, &beginning) else { return Err(standing) };
+        let walk = Walk::new(walker.clone(), frontal.route.clone(), beginning);
         let mut active = Active {
-            person: 0,
-            started_near: false,
-            camera: (*camera).clone(),
-            tilt: None,
-            height: *height,
             depth_sd_m: frontal.depth_sd_m(),
-            start,
-            walk: Walk::new(walker.clone(), frontal.route.clone(), beginning),
-            average: walker.clone(),
-            kept: Vec::new(),
-            gait_speed_mps: beginning.speed_mps,
             settled: true,
-            is_on_treadmill: false,
-            early: None,
+            kept: standing.kept,
             pieces: standing.pieces,
             feet: standing.feet,
-            earlier: Standing::default(),
-            before: Vec::new(),
-            frontal: None,
+            frontal: Some(frontal),
+            ..Active::new(walk, start, (*camera).clone(), *height)
         };
-        active.kept = standing.kept;
-        active.frontal = Some(frontal);
         let count = active.kept.len();
         active.follow_on(&active.walk.route.clone(), 0..count, usize::MAX, &options.walk);
         Ok(active)

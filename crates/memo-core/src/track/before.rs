@@ -90,9 +90,9 @@ impl<'a> Beside<'a> {
         };
         let path = self.walk.route.at(place.along_m);
         let scene = Scene::new(&self.walk.walker, self.camera, &path);
-        let [low, high] = body_box(self.camera, &scene.pose(&place).cylinders)?;
+        let height_px = body_box(self.camera, &scene.pose(&place).cylinders)?.height();
         let other = Hypothesis { phase: place.phase + 0.5, ..place };
-        Some(expected(&scene, [place, other], window, high.y - low.y))
+        Some(expected(&scene, [place, other], window, height_px))
     }
 }
 
@@ -183,11 +183,11 @@ impl Active {
         let others = Others::new(&seen.edges.others, self.camera.position());
         let path = self.walk.route.at(near.along_m);
         let scene = Scene::new(&self.walk.walker, &self.camera, &path).among(&others);
-        let [low, high] = body_box(&self.camera, &scene.pose(&near).cylinders)?;
+        let body = body_box(&self.camera, &scene.pose(&near).cylinders)?;
         let window = seen.edges.window.sides(0.0);
         let inside = |low: f64, high: f64, from: f64, to: f64| (high.min(to) - low.max(from)) / (high - low);
-        let across = inside(low.x, high.x, window.left, window.right);
-        let along = inside(low.y, high.y, window.top, window.bottom);
+        let across = inside(body.left, body.right, window.left, window.right);
+        let along = inside(body.top, body.bottom, window.top, window.bottom);
         if across.min(along) < LEAST_IN_WINDOW {
             return None;
         }

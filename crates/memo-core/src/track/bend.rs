@@ -116,7 +116,7 @@ impl Active {
         let kept: Vec<_> = self.kept[from..].iter().filter(|(_, edges)| edges.frame <= end).collect();
         let Some(first_s) = kept.first().map(|(_, edges)| edges.time_s) else { return false };
         let sightings: Vec<Sighting> = kept.iter().filter_map(|(sighting, _)| *sighting).collect();
-        if sightings.len() < options.start_frames {
+        if sightings.len() < options.start_frames.min(options.path_frames) {
             return false;
         }
         // 1. The curve, joined to the route so far.

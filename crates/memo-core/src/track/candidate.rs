@@ -12,13 +12,11 @@ use super::locate::{
 };
 use super::options::TrackerOptions;
 use super::options::start_height;
-use super::standing::Standing;
 use super::start::{StartReport, StartSearch};
 use super::walk::{FrameEdges, Walk};
 use crate::calibrate::TiltEstimate;
 use crate::image::Rectangle;
 use crate::model::{Camera, GaitStyle, Tilt, Walker, assumed_field_of_view_rad};
-use std::collections::BTreeMap;
 
 /// A candidate is dropped after this many consecutive frames without it.
 pub(super) const MISSED_FRAMES: usize = 3;
@@ -132,28 +130,15 @@ impl Candidate {
             return Err(Reason::OverGround { speed_mps: course.speed_mps });
         }
         let Started { camera, course, walker, start } = self.started_any_way(&sightings, given, &height)?;
-        let walk = Walk::new(walker.clone(), start.path, start.beginning);
+        let walk = Walk::new(walker, start.path, start.beginning);
         let walk = walk.through(self.seen.iter().map(|seen| &seen.edges), &camera, &options.walk);
         Ok(Active {
-            person: 0,
-            started_near: false,
-            camera,
             tilt: given.tilt,
-            height,
             depth_sd_m: course.depth_sd_m,
-            start,
-            walk,
-            average: Walker { style: GaitStyle::default(), ..walker },
-            kept: self.seen.iter().map(|seen| (Some(seen.sighting), seen.edges.clone())).collect(),
             gait_speed_mps: course.speed_mps,
-            settled: false,
-            is_on_treadmill: false,
-            feet: BTreeMap::new(),
-            earlier: Standing::default(),
-            before: Vec::new(),
-            frontal: None,
-            early: None,
+            kept: self.seen.iter().map(|seen| (Some(seen.sighting), seen.edges.clone())).collect(),
             pieces: self.seen.iter().filter_map(|seen| seen.piece.clone()).collect(),
+            ..Active::new(walk, start, camera, height)
         })
     }
 

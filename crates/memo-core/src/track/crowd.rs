@@ -9,7 +9,7 @@
 use super::decisions::{EXPLAINED, NEARER, OWNED, TURNED};
 use super::score::{EdgeLine, ModelLine};
 use super::search::{Hypothesis, Scene};
-use crate::image::{Mask, Rectangle};
+use crate::image::{Mask, Rectangle, Sides};
 use crate::model::body::PART_COUNT;
 use crate::model::{Camera, EllipticCylinder};
 use glam::{DVec2, Vec2};
@@ -167,16 +167,16 @@ fn paint_capsule(mask: &mut Mask, [a, b]: [DVec2; 2], radius_px: f64, value: boo
 }
 
 /// Bounding box of a body in the image, pixels.
-pub(super) fn body_box(camera: &Camera, body: &[EllipticCylinder]) -> Option<[DVec2; 2]> {
-    let mut bounds = [DVec2::INFINITY, DVec2::NEG_INFINITY];
+pub(super) fn body_box(camera: &Camera, body: &[EllipticCylinder]) -> Option<Sides> {
+    let (mut low, mut high) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
     for cylinder in body {
         let end = cylinder.world_from_cylinder.matrix3.z_axis * cylinder.half_length;
         for point in [cylinder.centre() + end, cylinder.centre() - end] {
             let pixel = camera.project(point)?;
-            bounds = [bounds[0].min(pixel), bounds[1].max(pixel)];
+            (low, high) = (low.min(pixel), high.max(pixel));
         }
     }
-    Some(bounds)
+    Some(Sides { left: low.x, top: low.y, right: high.x, bottom: high.y })
 }
 
 #[cfg(test)]
@@ -279,7 +279,8 @@ mod tests {
             assert!(apart_px > margin_px - 1.0 || !mask.at(x, y), "{x}, {y} is {apart_px} px off");
             assert!(apart_px < margin_px + 1.5 || mask.at(x, y), "{x}, {y} is {apart_px} px off");
         }
-        let [low, high] = body_box(&camera, &body).unwrap();
+        let Sides { left, top, right, bottom } = body_box(&camera, &body).unwrap();
+        let (low, high) = (DVec2::new(left, top), DVec2::new(right, bottom));
         let far = |x: usize, y: usize| {
             let point = DVec2::new(x as f64, y as f64);
             (point - point.clamp(low, high)).length() > 40.0

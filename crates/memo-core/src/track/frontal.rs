@@ -284,9 +284,7 @@ impl Frontal {
         // 2. The best line of phase against even motion.
         let points: Vec<(f64, f64)> = seen.iter().map(|(t, place)| (*t, path.along(*place))).collect();
         let line = frontal.best_line(&points, rates)?;
-        let (_, even) = reweighted_line(&points);
-        let evenly = SCALES_M.iter().map(|scale_m| likelihood(&even, *scale_m)).fold(f64::MIN, f64::max);
-        let gain = (line.likelihood - evenly) / LIKE_FRAMES;
+        let gain = (line.likelihood - evenly(&points)) / LIKE_FRAMES;
         Some((gain, frontal, line))
     }
 
@@ -412,9 +410,7 @@ impl Frontal {
         if points.len() < LEADING {
             return None;
         }
-        let (_, even) = reweighted_line(&points);
-        let evenly = SCALES_M.iter().map(|scale_m| likelihood(&even, *scale_m)).fold(f64::MIN, f64::max);
-        Some((likelihood(&off_m, WALKERS_OFF_M) - evenly) / LIKE_FRAMES)
+        Some((likelihood(&off_m, WALKERS_OFF_M) - evenly(&points)) / LIKE_FRAMES)
     }
 
     /// Whether feet and not contours show the place and phase of a frame.
@@ -579,6 +575,12 @@ fn reweighted_line(points: &[(f64, f64)]) -> ([f64; 2], Vec<f64>) {
         off_m = points.iter().map(off).collect();
     }
     (line, off_m)
+}
+
+/// Logarithm of the likelihood of points (time, place) of something that moves evenly.
+fn evenly(points: &[(f64, f64)]) -> f64 {
+    let (_, off_m) = reweighted_line(points);
+    SCALES_M.iter().map(|scale_m| likelihood(&off_m, *scale_m)).fold(f64::MIN, f64::max)
 }
 
 /// Logarithm of the likelihood of residuals after Cauchy's distribution of this scale, up to a constant.

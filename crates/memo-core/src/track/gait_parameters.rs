@@ -337,7 +337,7 @@ impl TrackedWalk {
             _ => self.depth_sd_m,
         };
         // Along the line of sight, the length of a row on the ground grows with the square of the distance.
-        let relative = match self.is_frontal {
+        let relative = match self.steps().get(middle).is_some_and(|step| step.by_feet) {
             true => 2.0 * depth_sd_m / path.point(middle_m, 0.0).truncate().distance(eye),
             false => depth_sd_m / path.distance(eye),
         };

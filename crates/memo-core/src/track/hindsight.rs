@@ -112,9 +112,11 @@ impl Active {
         joined.kept.truncate(count);
         joined.kept.extend(frames);
         joined.pieces.retain(|piece| piece.frame <= last);
+        let own_last = self.pieces.last().map_or(last, |piece| piece.frame.max(last));
+        let since = self.pieces.iter().filter(|piece| piece.frame > last);
         joined
             .pieces
-            .extend(self.pieces.iter().chain(&later.pieces).filter(|piece| piece.frame > last).cloned());
+            .extend(since.chain(later.pieces.iter().filter(|piece| piece.frame > own_last)).cloned());
         joined.frontal = Some(frontal);
         joined.follow_on(&route, 0..joined.kept.len(), usize::MAX, &options.walk);
         Some(joined)

@@ -1,7 +1,7 @@
 //! Options of the tracker.
 
 use super::evidence::{EvidenceOptions, EvidenceStream};
-use super::fit::FitOptions;
+use super::fit::{FitOptions, LEAST_FRAMES};
 use super::height::{BodyHeight, HeightSource, POPULATION_HEIGHT_M, combined, from_rectangles};
 use super::locate::Sighting;
 use super::start::CadenceRange;
@@ -110,6 +110,8 @@ impl TrackerOptions {
         }
         let is_enough = (5..=100).contains(&self.start_frames);
         OptionError::unless(is_enough, "start_frames", "between 5 and 100", self.start_frames as f64)?;
+        let is_enough = (LEAST_FRAMES..=1000).contains(&self.path_frames);
+        OptionError::unless(is_enough, "path_frames", "between 15 and 1000", self.path_frames as f64)?;
         self.fit.map_or(Ok(()), |fit| fit.check())?;
         OptionError::unless_positive("low_hz", self.cadence.low_hz)?;
         let is_above = self.cadence.high_hz >= self.cadence.low_hz && self.cadence.high_hz <= 100.0;

@@ -34,6 +34,8 @@ pub(super) struct Sign {
     pub time_s: f64,
     pub place_m: DVec2,
     pub velocity_mps: DVec2,
+    /// The direction that the person walks in, also on a treadmill.
+    pub way: DVec2,
     /// Whether the person stood still.
     pub stands: bool,
 }
@@ -46,21 +48,22 @@ const STANDS_S: f64 = 60.0;
 /// The numbers given so far.
 #[derive(Debug, Default)]
 pub(super) struct Identities {
-    count: usize,
+    /// How many walks each person has.
+    walks: Vec<usize>,
     ended: Vec<(usize, Sign)>,
 }
 
 impl Identities {
     /// How many people appeared.
     pub fn count(&self) -> usize {
-        self.count
+        self.walks.len()
     }
 
     /// The person who ended nearest to where this walk starts, or a new one.
     pub fn appear(&mut self, sign: &Sign) -> usize {
         let Some(person) = self.known(sign) else {
-            self.count += 1;
-            return self.count - 1;
+            self.walks.push(1);
+            return self.walks.len() - 1;
         };
         self.is_back(person);
         person
@@ -85,8 +88,14 @@ impl Identities {
         self.ended.push((person, sign));
     }
 
-    /// Forgets the end of a person's walk, because the person walks on.
+    /// Notes a further walk of a person.
     pub fn is_back(&mut self, person: usize) {
+        self.walks[person] += 1;
+        self.forget_end(person);
+    }
+
+    /// Forgets where a person's walk ended: the person was found again.
+    pub fn forget_end(&mut self, person: usize) {
         self.ended.retain(|(ended, _)| *ended != person);
     }
 
@@ -95,11 +104,14 @@ impl Identities {
         self.ended.clear();
     }
 
-    /// Takes the number of something back that did not walk, if it was the last one given.
+    /// Takes a walk of a person back, and the number with the last of them, if no later one is in use.
     pub fn withdraw(&mut self, person: usize) {
-        if person + 1 == self.count {
-            self.count -= 1;
+        self.walks[person] -= 1;
+        while self.walks.last() == Some(&0) {
+            self.walks.pop();
         }
+        let walks = &self.walks;
+        self.ended.retain(|(ended, _)| walks.get(*ended).is_some_and(|walks| *walks > 0));
     }
 }
 
@@ -117,10 +129,9 @@ impl Sign {
             return (elapsed_s >= 0.0 && off_m <= PLACE_M).then_some(off_m);
         }
         let off_m = (self.place_m + elapsed_s * self.velocity_mps).distance(later.place_m);
-        let ways = [self, later].map(|sign| sign.velocity_mps.normalize_or_zero());
         let is_same = elapsed_s >= 0.0
             && off_m <= PLACE_M + PLACE_M_PER_S * elapsed_s
-            && ways[0].dot(ways[1]) >= SAME_WAY;
+            && self.way.dot(later.way) >= SAME_WAY;
         is_same.then_some(off_m)
     }
 
@@ -135,7 +146,8 @@ mod tests {
     use super::*;
 
     fn sign(time_s: f64, x: f64, speed_mps: f64) -> Sign {
-        Sign { time_s, place_m: DVec2::new(x, 5.0), velocity_mps: DVec2::new(speed_mps, 0.0), stands: false }
+        let (place_m, velocity_mps) = (DVec2::new(x, 5.0), DVec2::new(speed_mps, 0.0));
+        Sign { time_s, place_m, velocity_mps, way: velocity_mps.normalize(), stands: false }
     }
 
     #[test]
@@ -185,9 +197,34 @@ mod tests {
         for x in [0.0, 9.0, 18.0] {
             people.appear(&sign(0.0, x, 1.0));
         }
-        people.withdraw(0);
+        people.withdraw(1);
         assert_eq!(people.count(), 3, "an earlier number stays");
         people.withdraw(2);
-        assert_eq!(people.appear(&sign(0.0, 30.0, 1.0)), 2);
+        assert_eq!(people.appear(&sign(0.0, 30.0, 1.0)), 1, "and goes with the later ones");
+    }
+
+    #[test]
+    fn a_number_stays_with_who_walked_before() {
+        let mut people = Identities::default();
+        people.appear(&sign(0.0, 0.0, 1.2));
+        people.end(0, sign(2.0, 2.4, 1.2));
+        assert_eq!(people.appear(&sign(3.0, 3.6, 1.2)), 0);
+        people.withdraw(0);
+        assert_eq!(people.appear(&sign(4.0, 9.0, 1.2)), 1, "a stranger");
+        // Nobody is where a walk ended that was taken back.
+        people.end(1, sign(5.0, 10.2, 1.2));
+        people.withdraw(1);
+        assert_eq!(people.known(&sign(5.1, 10.3, 1.2)), None);
+    }
+
+    #[test]
+    fn who_walks_on_a_treadmill_stays_the_same_whatever_its_speed() {
+        let on_the_spot = |time_s: f64, way: f64| Sign {
+            velocity_mps: DVec2::ZERO,
+            way: DVec2::new(way, 0.0),
+            ..sign(time_s, 0.0, 1.0)
+        };
+        assert!(on_the_spot(40.0, 1.0).leads_to(&on_the_spot(40.1, 1.0)));
+        assert!(!on_the_spot(40.0, 1.0).leads_to(&on_the_spot(40.1, -1.0)));
     }
 }

@@ -220,8 +220,7 @@ impl TrackedWalk {
     /// The box of the body in the image in each frame.
     fn boxes(&self) -> BTreeMap<usize, Sides> {
         let of_row = |(k, row): (usize, &Row)| {
-            let [low, high] = body_box(&self.camera, &self.pose_of(k, row).cylinders)?;
-            Some((row.frame, Sides { left: low.x, top: low.y, right: high.x, bottom: high.y }))
+            Some((row.frame, body_box(&self.camera, &self.pose_of(k, row).cylinders)?))
         };
         self.rows().iter().enumerate().filter_map(of_row).collect()
     }

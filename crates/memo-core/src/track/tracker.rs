@@ -33,8 +33,8 @@ use super::candidate::{Candidate, Given, MISSED_FRAMES, Seen};
 use super::crowd::{Expected, body_box, changing_share, clear_explained, expected, keep_own, keep_unowned};
 use super::decisions::{OUTSIDE_SHARE, SAME_BODY, SAME_PLACE_M};
 use super::evidence::{Evidence, EvidenceError, EvidenceOptions, EvidenceStream};
-use super::fit::FitError;
 use super::fit::views::{Backdrop, Piece};
+use super::fit::{FitError, WalkFit};
 use super::height::{is_of_a_person, is_of_one_person};
 use super::left_out::{Hindrance, LeftOut, Reason, Unfollowed};
 use super::locate::{Sighting, same_person};
@@ -164,13 +164,13 @@ pub struct Tracker {
     standing: Standing,
     /// What moves and is not followed.
     unfollowed: Unfollowed,
-    /// The frame in which each person who is followed was started.
-    started: BTreeMap<usize, usize>,
     /// How a camera that is not given is tilted, by the first frame with something that may be a person.
     tilt: Option<TiltEstimate>,
     /// Boxes around people that were given, by frame.
     boxes: BTreeMap<usize, Vec<Rectangle>>,
     finished: Vec<TrackedWalk>,
+    /// Walks that were returned, as long as others of their time are not over.
+    returned: Vec<TrackedWalk>,
     report: SeekReport,
     is_finished: bool,
     /// Number of frames after which a walk is returned.
@@ -199,10 +199,10 @@ impl Tracker {
             identities: Identities::default(),
             standing: Standing::default(),
             unfollowed: Unfollowed::default(),
-            started: BTreeMap::new(),
             tilt: None,
             boxes: BTreeMap::new(),
             finished: Vec::new(),
+            returned: Vec::new(),
             report: SeekReport::default(),
             is_finished: false,
             longest_walk,
@@ -254,21 +254,31 @@ impl Tracker {
         if let Some(evidence) = self.stream.finish()? {
             self.advance(&evidence)?;
         }
-        self.take_everybody().into_iter().for_each(|active| self.end_walk(active));
+        self.end_everybody();
         self.unfollowed.finish(self.options.start_frames);
         Ok(())
     }
 
-    /// Everybody who is followed or was until lately.
-    fn take_everybody(&mut self) -> Vec<Active> {
-        let fading = std::mem::take(&mut self.fading).into_iter().map(|(_, active)| active);
-        fading.chain(std::mem::take(&mut self.people)).collect()
+    /// Ends the walks of everybody who is followed or was until lately, one by one: others may have stood in front.
+    fn end_everybody(&mut self) {
+        while !self.fading.is_empty() {
+            let (_, active) = self.fading.remove(0);
+            self.end_walk(active);
+        }
+        while !self.people.is_empty() {
+            let active = self.people.remove(0);
+            self.end_walk(active);
+        }
     }
 
-    /// The walks that have ended since the last call, in order of their first frames.
+    /// The walks that have ended since the last call, in order of their first frames. Should a later walk turn out to be the
+    /// better model of a person whose walk was taken already, both are returned.
     #[must_use]
     pub fn take_finished(&mut self) -> Vec<TrackedWalk> {
         let mut walks = std::mem::take(&mut self.finished);
+        let since_s = self.since_s();
+        self.returned.extend(walks.iter().cloned());
+        self.returned.retain(|walk| walk.steps().last().is_some_and(|last| last.time_s >= since_s));
         walks.sort_by_key(|walk| (walk.steps().first().map(|step| step.frame), walk.person));
         walks
     }
@@ -315,12 +325,17 @@ impl Tracker {
 
     /// Ends all walks before the view ended; what follows is another scene.
     fn end_view(&mut self, loss: &Loss) {
-        for mut active in self.take_everybody() {
-            active.drop_from(loss.frame.saturating_sub(1));
-            if active.walk.twins[0].steps.len() >= self.options.start_frames {
-                self.end_walk(active);
-            }
+        let fading = self.fading.iter_mut().map(|(_, active)| active);
+        fading.chain(&mut self.people).for_each(|active| active.drop_from(loss.frame.saturating_sub(1)));
+        let is_short = |active: &Active| active.steps().len() < self.options.start_frames;
+        let fading = self.fading.extract_if(.., |(_, active)| is_short(active)).map(|(_, active)| active);
+        let short: Vec<Active> =
+            fading.chain(self.people.extract_if(.., |active| is_short(active))).collect();
+        for active in short {
+            let reason = Reason::TooBrief { frames: active.steps().len() };
+            self.withdraw(active.person, walk_boxes(&active), reason);
         }
+        self.end_everybody();
         self.unfollowed.finish(self.options.start_frames);
         self.candidates.clear();
         self.sought.clear();
@@ -386,16 +401,17 @@ impl Tracker {
 
     /// Sorts the people by distance and predicts each.
     fn expect(&mut self, evidence: &Evidence) -> Vec<Expected> {
-        let mut all = Vec::new();
+        let (mut all, mut gone) = (Vec::new(), Vec::new());
         for active in std::mem::take(&mut self.people) {
             match self.predicted(&active, evidence) {
                 Some(expected) => all.push((active, expected)),
-                None => self.end_walk(active),
+                None => gone.push(active),
             }
         }
         all.sort_by(|a, b| a.1.distance_m.total_cmp(&b.1.distance_m));
         let expected;
         (self.people, expected) = all.into_iter().unzip();
+        gone.into_iter().for_each(|active| self.end_walk(active));
         expected
     }
 
@@ -406,7 +422,8 @@ impl Tracker {
         let (predicted, other) = (predict(best), predict(1 - best));
         let scene = active.scene(predicted.along.position);
         let body = scene.pose(&predicted.hypothesis()).cylinders;
-        let [low, high] = body_box(&active.camera, &body)?;
+        let Sides { left, top, right, bottom } = body_box(&active.camera, &body)?;
+        let (low, high) = (DVec2::new(left, top), DVec2::new(right, bottom));
         let size = DVec2::new(evidence.grey.width() as f64, evidence.grey.height() as f64);
         let (low_in, high_in) = (low.max(DVec2::ZERO), high.min(size - 1.0));
         let shown = (high_in - low_in) / (high - low);
@@ -498,7 +515,8 @@ impl Tracker {
         active.earlier = standing.before(active.kept.first().map_or(0, |(_, edges)| edges.frame));
         let active = self.people.remove(k);
         let (person, joined) = (active.person, self.gone_on(&active));
-        if joined.as_ref().is_some_and(|joined| joined.person != person) {
+        // Two walks became one.
+        if joined.is_some() {
             self.identities.withdraw(person);
         }
         self.people.insert(k, joined.unwrap_or(active));
@@ -535,13 +553,14 @@ impl Tracker {
     /// The number of somebody who starts to be followed. A walk can leave its person, who turns or slows. Who starts
     /// where that person was is the same person, whose first walk ends there.
     fn identified(&mut self, new: &Active) -> usize {
-        let Some(start) = new.sign_at(0) else { return self.identities.count() };
+        let start = new.sign_at(0).expect("a walk starts with frames");
         let Some(n) = self.faded(&start) else { return self.identities.appear(&start) };
         let (_, mut old) = self.fading.remove(n);
         old.end_before(start.time_s);
         let person = old.person;
-        self.end_walk(old);
         self.identities.is_back(person);
+        self.end_walk(old);
+        self.identities.forget_end(person);
         person
     }
 
@@ -627,12 +646,10 @@ impl Tracker {
     /// Boxes that are not those of the people who are followed: each has the box that overlaps the body most.
     fn unclaimed(&self, mut boxes: Vec<Rectangle>) -> Vec<Rectangle> {
         for active in &self.people {
-            let Some([low, high]) =
-                active.as_followed().and_then(|seen| body_box(&active.camera, &seen.body))
+            let Some(body) = active.as_followed().and_then(|seen| body_box(&active.camera, &seen.body))
             else {
                 continue;
             };
-            let body = Sides { left: low.x, top: low.y, right: high.x, bottom: high.y };
             let overlaps = boxes.iter().map(|r| r.sides(0.0).overlap(&body)).enumerate();
             let own = overlaps.max_by(|a, b| a.1.total_cmp(&b.1));
             if let Some((k, _)) = own.filter(|(_, part)| *part >= OWN_BOX) {
@@ -751,8 +768,9 @@ impl Tracker {
                     // In the frames before somebody is back, there may be the earlier walk.
                     if active.person < known {
                         active.before.clear();
+                        self.order_of_heights = order;
                     }
-                    self.started.insert(active.person, evidence.frame);
+                    active.started_frame = Some(evidence.frame);
                     self.people.push(active);
                 }
                 Err(reason) => {
@@ -834,65 +852,26 @@ impl Tracker {
         self.people.iter_mut().filter(beside).any(|person| person.has_turned(options))
     }
 
+    /// 1. The route and its frames, from before and after each of them.
+    /// 2. The person, fitted to all of them.
+    /// 3. What is no walk, or a second model of somebody else, is withdrawn.
     fn end_walk(&mut self, active: Active) {
         let mut active = if active.settled { active } else { self.begun_on_the_spot(active) };
-        active.settle(&self.backdrop, &self.options);
-        // On a smoothed route, the feet would walk on.
-        let standing = active.standing();
-        let followed = self.people.iter().map(|other| (&other.walk, &other.camera));
-        let ended = self.finished.iter().map(|other| (&other.walk, &other.camera));
-        let beside =
-            followed.chain(ended).filter_map(|(walk, camera)| Beside::new(walk, camera, &self.options));
-        active.begin_before(&beside.collect::<Vec<_>>(), &self.options);
-        active.begin_earlier(&self.options);
-        active.turned(&self.options);
-        active.pace_all();
-        active.straighten(&self.options.walk);
-        let standing = standing.or_else(|| active.standing());
-        active.trim();
-        let started = self.started.remove(&active.person);
-        let walk_boxes = walk_boxes(&active, started);
+        let standing = self.complete(&mut active);
+        let walk_boxes = walk_boxes(&active);
         if !active.is_walk() {
-            self.withdraw(active.person, walk_boxes, Reason::NotWalking);
-            return;
+            return self.withdraw(active.person, walk_boxes, Reason::NotWalking);
         }
         let p_swapped = active.p_swapped(&self.options);
         let fit = active.fit(&self.backdrop, &self.options, Some(p_swapped));
-        // What was left over from somebody else can look like a walker, but then the contours do not fit.
-        let is_short = active.steps().len() < self.options.start_frames;
-        let is_left_over =
-            active.started_near && (is_short || matches!(fit, Some(Err(FitError::Misfit { .. }))));
-        if is_left_over || !active.takes_steps(fit.as_ref().and_then(|fit| fit.as_ref().ok())) {
-            let is_brief = is_left_over && is_short;
-            let frames = active.steps().len();
-            let reason = if is_brief { Reason::TooBrief { frames } } else { Reason::NotWalking };
-            self.withdraw(active.person, walk_boxes, reason);
-            return;
+        if let Some(reason) = self.no_walk(&active, fit.as_ref()) {
+            return self.withdraw(active.person, walk_boxes, reason);
         }
         let sign = standing.or_else(|| active.sign());
-        let height = active.height_by(fit.as_ref().and_then(|fit| fit.as_ref().ok()));
-        let is_frontal = active.is_frontal();
-        let walk = TrackedWalk {
-            person: active.person,
-            camera_turns: active.turns(self.stream.camera_motions()),
-            crowns_px: active.crowns_px(),
-            walk: active.walk,
-            height,
-            camera: active.camera,
-            average: active.average,
-            depth_sd_m: active.depth_sd_m,
-            start: active.start,
-            tilt: active.tilt,
-            gait_speed_mps: active.gait_speed_mps,
-            is_on_treadmill: active.is_on_treadmill,
-            is_frontal,
-            fit,
-            options: self.options.walk,
-        };
+        let walk = self.tracked(active, fit);
         // Two models can come to lie on one person, the fitted ones too.
-        if self.finished.iter().any(|other| walk.is_double_of(other)) {
-            self.withdraw(walk.person, walk_boxes, Reason::Beside);
-            return;
+        if self.finished.iter().chain(&self.returned).any(|other| walk.is_double_of(other)) {
+            return self.withdraw(walk.person, walk_boxes, Reason::Beside);
         }
         if let Some(k) = self.finished.iter().position(|other| other.is_double_of(&walk)) {
             let double = self.finished.remove(k);
@@ -903,6 +882,58 @@ impl Tracker {
             self.identities.end(walk.person, sign);
         }
         self.finished.push(walk);
+    }
+
+    /// Completes the route and the frames of a walk that is over; returns where the person stands, if so.
+    fn complete(&self, active: &mut Active) -> Option<Sign> {
+        active.settle(&self.backdrop, &self.options);
+        // On a smoothed route, the feet would walk on.
+        let standing = active.standing();
+        let fading = self.fading.iter().map(|(_, other)| other);
+        let followed = self.people.iter().chain(fading).map(|other| (&other.walk, &other.camera));
+        let ended = self.finished.iter().chain(&self.returned).map(|other| (&other.walk, &other.camera));
+        let beside =
+            followed.chain(ended).filter_map(|(walk, camera)| Beside::new(walk, camera, &self.options));
+        active.begin_before(&beside.collect::<Vec<_>>(), &self.options);
+        active.begin_earlier(&self.options);
+        active.turned(&self.options);
+        active.pace_all();
+        active.straighten(&self.options.walk);
+        let standing = standing.or_else(|| active.standing());
+        active.trim();
+        standing
+    }
+
+    /// Why something that was followed is no walk. What was left over from somebody else can look like a walker, but then
+    /// the contours do not fit.
+    fn no_walk(&self, active: &Active, fit: Option<&Result<WalkFit, FitError>>) -> Option<Reason> {
+        let frames = active.steps().len();
+        if active.started_near && frames < self.options.start_frames {
+            return Some(Reason::TooBrief { frames });
+        }
+        let is_left_over = active.started_near && matches!(fit, Some(Err(FitError::Misfit { .. })));
+        let takes_steps = active.takes_steps(fit.and_then(|fit| fit.as_ref().ok()));
+        (is_left_over || !takes_steps).then_some(Reason::NotWalking)
+    }
+
+    fn tracked(&self, active: Active, fit: Option<Result<WalkFit, FitError>>) -> TrackedWalk {
+        TrackedWalk {
+            person: active.person,
+            camera_turns: active.turns(self.stream.camera_motions()),
+            crowns_px: active.crowns_px(),
+            height: active.height_by(fit.as_ref().and_then(|fit| fit.as_ref().ok())),
+            is_frontal: active.is_frontal(),
+            walk: active.walk,
+            camera: active.camera,
+            average: active.average,
+            depth_sd_m: active.depth_sd_m,
+            start: active.start,
+            tilt: active.tilt,
+            gait_speed_mps: active.gait_speed_mps,
+            is_on_treadmill: active.is_on_treadmill,
+            fit,
+            options: self.options.walk,
+        }
     }
 }
 

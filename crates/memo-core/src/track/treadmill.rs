@@ -23,7 +23,7 @@ use super::standing::Standing;
 use super::start::{CadenceRange, Direction, PhaseCurve, StartReport, phase_lines, start};
 use super::walk::{FrameEdges, Walk, WalkOptions};
 use crate::calibrate::TiltEstimate;
-use crate::model::{Camera, GaitStyle, Walker};
+use crate::model::{Camera, Walker};
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
@@ -112,25 +112,15 @@ impl Spot<'_> {
         let walk = Walk::new(walker.clone(), start.path, start.beginning);
         let walk = walk.through(standing.kept.iter().map(|(_, edges)| edges), camera, &options.walk);
         Ok(Active {
-            person: 0,
-            started_near: false,
-            camera: camera.clone(),
             tilt: *tilt,
-            height: *height,
             depth_sd_m: course.depth_sd_m,
-            start,
-            walk,
-            average: Walker { style: GaitStyle::default(), ..walker.clone() },
-            kept: standing.kept,
             gait_speed_mps: course.speed_mps,
-            settled: false,
+            kept: standing.kept,
             pieces: standing.pieces,
-            is_on_treadmill: true,
             feet: standing.feet,
-            earlier: Standing::default(),
-            before: Vec::new(),
-            frontal: None,
+            is_on_treadmill: true,
             early: Some(self.backdrop.clone()),
+            ..Active::new(walk, start, camera.clone(), *height)
         })
     }
 

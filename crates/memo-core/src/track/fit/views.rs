@@ -115,12 +115,14 @@ impl Backdrop {
         self.views_before(pieces, LEAST_EMPTY)
     }
 
-    /// The same of somebody who never leaves a place: the empty scene is that of the frames without the person, and
+    /// The same of somebody who never leaves a place: the empty scene is that of other frames in which nobody is there, and
     /// unknown if there are none. The head hardly moves, so changes do not show the crown.
     pub fn views_on_the_spot<'a>(&self, pieces: impl Iterator<Item = &'a Piece>) -> Vec<View> {
         let pieces: Vec<&Piece> = pieces.collect();
         let is_walk = |frame: usize| pieces.iter().any(|piece| piece.frame == frame);
-        if self.frames.iter().any(|kept| !is_walk(kept.frame)) {
+        let place = pieces.iter().map(|piece| piece.kept).reduce(|a, b| a.union(&b));
+        let is_free = |window: &Rectangle| place.is_none_or(|place| place.gap(window) != [0, 0]);
+        if self.frames.iter().any(|kept| !is_walk(kept.frame) && kept.people.iter().all(is_free)) {
             let views = self.views_before(pieces.into_iter(), 1);
             return views.into_iter().map(|view| View { crown_px: None, ..view }).collect();
         }
@@ -335,6 +337,11 @@ mod tests {
         (2..8).for_each(|k| always.push(k, &frame(k)));
         let views = always.views_on_the_spot(walk.iter());
         assert!(views.len() == 6 && views.iter().all(|view| !view.is_empty_known));
+        // Nor do frames of an earlier walk in the same place show the scene behind it.
+        let mut earlier = Backdrop::default();
+        (0..8).for_each(|k| earlier.push(k, &frame(k)));
+        (0..8).for_each(|k| earlier.occupy(k, place));
+        assert!(earlier.views_on_the_spot(walk.iter()).iter().all(|view| !view.is_empty_known));
         assert!(
             views[3].pixels.pixels().iter().zip(walk[3].grey.pixels()).all(|(pair, grey)| pair[0] == *grey)
         );

@@ -526,3 +526,14 @@ fn the_scale_is_uncertain_by_distance_posture_and_along_the_view_by_a_guessed_fo
         assert!((scale_sd(slant_rad, true) - guessed).abs() < 1e-12);
     }
 }
+
+/// Of somebody who turned, so that the feet show the middle of the walk and contours its ends.
+#[test]
+fn the_scale_of_a_path_past_the_camera_is_that_of_rows_on_the_ground() {
+    let mut walk = tracked(&exact(1.0, 0.0), Path { heading_rad: -1.5, ..ACROSS }, Direction::Forward);
+    let middle = walk.steps().len() / 2;
+    let place = walk.route().place(walk.steps()[middle].state.along.position);
+    walk.walk.twins[0].steps[middle].by_feet = true;
+    let range_m = place.distance(walk.camera.position().truncate());
+    assert!((walk.scale_sd() - (0.2 / range_m).hypot(0.015)).abs() < 1e-12);
+}

@@ -48,7 +48,7 @@ impl Tracker {
                     Some(joined) => active = joined,
                     None => active.person = self.identified(&active),
                 }
-                self.started.entry(active.person).or_insert(evidence.frame);
+                active.started_frame.get_or_insert(evidence.frame);
                 self.people.push(active);
             }
             Err(standing) if standing.lasts_s() < LONGEST_S => self.standing = standing,
@@ -60,10 +60,26 @@ impl Tracker {
         if self.options.treadmill == Some(false) {
             return Err(standing);
         }
-        match self.spot(&standing.sightings(), size, self.identities.count()) {
-            Some(spot) => spot.begin(standing),
-            None => Err(standing),
-        }
+        self.begun_with_a_height(standing, |standing, person| {
+            match self.spot(&standing.sightings(), size, person) {
+                Some(spot) => spot.begin(standing),
+                None => Err(standing),
+            }
+        })
+    }
+
+    /// The walk with the height of somebody who is expected back and is back with it, or of the next person.
+    fn begun_with_a_height(
+        &self,
+        standing: Standing,
+        begin: impl Fn(Standing, usize) -> Result<Active, Standing>,
+    ) -> Result<Active, Standing> {
+        let time_s = standing.kept.first().map_or(0.0, |(_, edges)| edges.time_s);
+        let is_back = |&person: &usize| {
+            begin(standing.clone(), person).ok().filter(|active| self.is_back(person, active))
+        };
+        let back = self.of_other_height(time_s).iter().find_map(is_back);
+        back.map_or_else(|| begin(standing, self.identities.count()), Ok)
     }
 
     /// Only a calibrated camera shows how far away feet are.
@@ -75,12 +91,13 @@ impl Tracker {
         if feet_cut_off(&sightings, size[1] as usize) || standing.lasts_s() < SHORTEST_S {
             return Err(standing);
         }
-        let next_m = self.given_height(self.identities.count());
-        let height = approaching_height(options, next_m, camera, &sightings);
-        match options.walker(height.height_m, COMFORTABLE_MPS) {
-            Ok(walker) => Approach { camera, height, walker, options }.begin(standing),
-            Err(_) => Err(standing),
-        }
+        self.begun_with_a_height(standing, |standing, person| {
+            let height = approaching_height(options, self.given_height(person), camera, &sightings);
+            match options.walker(height.height_m, COMFORTABLE_MPS) {
+                Ok(walker) => Approach { camera, height, walker, options }.begin(standing),
+                Err(_) => Err(standing),
+            }
+        })
     }
 
     /// What a start of a person on the spot needs.
@@ -106,9 +123,9 @@ impl Tracker {
         if standing.kept.len() < self.options.path_frames {
             return active;
         }
-        let person = active.person;
+        let Active { person, started_frame, .. } = active;
         match self.spot(&standing.sightings(), active.camera.size, person).map(|spot| spot.begin(standing)) {
-            Some(Ok(on_the_spot)) => Active { person, ..on_the_spot },
+            Some(Ok(on_the_spot)) => Active { person, started_frame, ..on_the_spot },
             _ => active,
         }
     }

@@ -16,6 +16,7 @@ use crate::image::flow::FlowOptions;
 use crate::image::{BackgroundOptions, CleanOptions, Image};
 use crate::model::body::PART_COUNT;
 use crate::track::fit::FitOptions;
+use crate::track::steady::LossReason;
 
 const SIZE: [usize; 2] = [640, 480];
 
@@ -160,6 +161,8 @@ fn options_out_of_range_are_refused_by_name() {
     };
     assert_eq!(refused(|o| o.start_frames = 4), Some("start_frames"));
     assert_eq!(refused(|o| o.start_frames = 101), Some("start_frames"));
+    assert_eq!(refused(|o| o.path_frames = 14), Some("path_frames"));
+    assert_eq!(refused(|o| o.path_frames = 1001), Some("path_frames"));
     assert_eq!(refused(|o| o.field_of_view_rad = Some(4f64.to_radians())), Some("field of view"));
     assert_eq!(refused(|o| o.field_of_view_rad = Some(171f64.to_radians())), Some("field of view"));
     assert_eq!(refused(|o| (o.start_frames, o.field_of_view_rad) = (5, Some(0.1))), None);
@@ -275,6 +278,7 @@ fn following(count: usize, along_m: f64, speed_mps: f64) -> Tracker {
         settled: true,
         ..followed
     });
+    tracker.identities.appear(&tracker.people[0].sign_at(0).unwrap());
     tracker
 }
 
@@ -468,7 +472,7 @@ fn following_two(gap_m: f64) -> Tracker {
     let behind = Path { origin: DVec2::new(0.0, gap_m), ..PATH };
     let mut second = following(40, 0.0, 1.2).people.remove(0);
     second.walk.route = behind.into();
-    second.person = 1;
+    second.person = tracker.identities.appear(&second.sign_at(0).unwrap());
     tracker.people.push(second);
     tracker
 }
@@ -547,13 +551,9 @@ fn given_boxes_are_sought_instead_of_what_moves() {
 fn somebody_who_is_followed_has_the_box_that_overlaps_the_body_most() {
     let followed = following(30, 0.0, 1.2);
     let body = body_box(&followed.people[0].camera, &followed.people[0].body().unwrap()).unwrap();
-    let [low, high] = body.map(|corner| corner.round());
-    let own = Rectangle {
-        left: low.x as usize,
-        top: low.y as usize,
-        right: high.x as usize,
-        bottom: high.y as usize,
-    };
+    let [left, top, right, bottom] =
+        [body.left, body.top, body.right, body.bottom].map(|side| side.round() as usize);
+    let own = Rectangle { left, top, right, bottom };
     let beside = |by: usize| Rectangle { left: own.left + by, right: own.right + by, ..own };
     let half = (own.width() as f64 * 0.5) as usize;
     assert_eq!(followed.unclaimed(vec![beside(half), own]), [beside(half)], "one box for one person");
@@ -616,6 +616,73 @@ fn sought_with_heights() -> Tracker {
 
 fn numbers_and_heights(tracker: &Tracker) -> Vec<(usize, BodyHeight)> {
     tracker.people.iter().map(|active| (active.person, active.height)).collect()
+}
+
+#[test]
+fn a_walk_that_the_end_of_a_view_cuts_short_uses_up_no_number_and_no_height() {
+    for (frame, count) in [(20, 1), (10, 0)] {
+        let mut tracker = following(20, 0.0, 1.2);
+        tracker.end_view(&Loss { frame, reason: LossReason::Cut });
+        assert!(tracker.people.is_empty());
+        assert_eq!(tracker.identities.count(), count, "cut in frame {frame}");
+    }
+}
+
+/// A walk that left its person is taken back when the person is found again, but the number stays.
+#[test]
+fn who_is_found_again_keeps_the_number_if_the_walk_before_was_none() {
+    let mut tracker = following(40, 0.0, 0.0);
+    let mut old = tracker.people.remove(0);
+    let new = old.clone();
+    for twin in &mut old.walk.twins {
+        twin.steps.iter_mut().for_each(|step| step.state.along.velocity = 1.2);
+        twin.steps.iter_mut().for_each(|step| step.time_s -= 1.6);
+    }
+    let last = &new.walk.twins[0].steps[0];
+    let meant = old.sign_at(39).unwrap();
+    assert!(meant.time_s < last.time_s && !old.is_walk());
+    tracker.fading.push((meant.time_s, old));
+    assert_eq!(tracker.identified(&new), 0);
+    assert!(tracker.take_finished().is_empty() && tracker.seek_report().refused_starts == 1);
+    let stranger = Sign { place_m: DVec2::new(9.0, 9.0), ..new.sign_at(0).unwrap() };
+    assert_eq!(tracker.identities.appear(&stranger), 1);
+}
+
+#[test]
+fn heights_change_places_only_for_who_is_new() {
+    let order = |is_back: bool| {
+        let options = TrackerOptions { start_frames: 5, further_heights_m: vec![1.5, 1.76], ..options() };
+        let candidate = || Candidate { seen: seen_walking(1.3), ..Candidate::default() };
+        let mut tracker = Tracker { candidates: vec![candidate()], ..Tracker::new(options).unwrap() };
+        tracker.start(&evidence(5, &[]));
+        let first = tracker.people.remove(0);
+        let start = first.sign_at(0).unwrap();
+        if is_back {
+            tracker.identities.end(0, start);
+        }
+        tracker.candidates.push(candidate());
+        tracker.start(&evidence(6, &[]));
+        assert_eq!(tracker.people[0].person, usize::from(!is_back));
+        tracker.order_of_heights.clone()
+    };
+    assert_eq!(order(true), [0, 1, 2], "the next one is still to come");
+    assert_eq!(order(false), [0, 2, 1], "of 1.50 and 1.76 m the second is seen");
+}
+
+/// Two models of one person, of which the first was taken when the second was still followed.
+#[test]
+fn a_second_model_of_somebody_whose_walk_was_taken_is_withdrawn() {
+    let walks = |are_taken_early: bool| {
+        let mut tracker = following_two(0.0);
+        tracker.people[1].started_near = false;
+        let first = tracker.people.remove(0);
+        tracker.end_walk(first);
+        let mut count = if are_taken_early { tracker.take_finished().len() } else { 0 };
+        tracker.finish().unwrap();
+        count += tracker.take_finished().len();
+        count
+    };
+    assert_eq!([true, false].map(walks), [1, 1]);
 }
 
 #[test]

@@ -30,31 +30,26 @@ pub(super) fn with_small_ones(group: &GroupOptions) -> GroupOptions {
     GroupOptions { min_area: group.min_area / 4, ..*group }
 }
 
-/// Where somebody was in the frames of a walk that was started in a frame, if it was.
-pub(super) fn walk_boxes(active: &Active, started: Option<usize>) -> Option<WalkBoxes> {
+/// Where somebody was in the frames of a walk.
+pub(super) fn walk_boxes(active: &Active) -> Option<WalkBoxes> {
     let shot = |step: &super::super::walk::Step| {
         let hypothesis = step.state.hypothesis();
         let body = active.scene(hypothesis.along_m).pose(&hypothesis).cylinders;
         let rectangle = body_rectangle(&active.camera, &body)?;
         Some(Shot { frame: step.frame, time_s: step.time_s, rectangle })
     };
-    WalkBoxes::new(active.steps().iter().filter_map(shot), started)
+    WalkBoxes::new(active.steps().iter().filter_map(shot), active.started_frame)
 }
 
 /// The rectangle of a body in the image; `None` if it is outside.
 fn body_rectangle(camera: &Camera, body: &[EllipticCylinder]) -> Option<Rectangle> {
-    let [low, high] = body_box(camera, body)?;
-    let last = DVec2::new(f64::from(camera.size[0]), f64::from(camera.size[1])) - 1.0;
-    if high.min_element() < 0.0 || low.x > last.x || low.y > last.y {
+    let Sides { left, top, right, bottom } = body_box(camera, body)?;
+    let [last_x, last_y] = camera.size.map(|size| f64::from(size) - 1.0);
+    if right.min(bottom) < 0.0 || left > last_x || top > last_y {
         return None;
     }
-    let (low, high) = (low.clamp(DVec2::ZERO, last), high.clamp(DVec2::ZERO, last));
-    Some(Rectangle {
-        left: low.x as usize,
-        top: low.y as usize,
-        right: high.x as usize,
-        bottom: high.y as usize,
-    })
+    let [column, row] = [last_x, last_y].map(|last| move |at: f64| at.clamp(0.0, last) as usize);
+    Some(Rectangle { left: column(left), top: row(top), right: column(right), bottom: row(bottom) })
 }
 
 impl Tracker {
@@ -79,14 +74,19 @@ impl Tracker {
 
     /// Decides on what is gone, once no walk of its time goes on or can still start.
     pub(super) fn settle_unfollowed(&mut self) {
+        let since_s = self.since_s();
+        self.unfollowed.settle(since_s, self.options.start_frames);
+    }
+
+    /// The first time of all walks that go on or can still start.
+    pub(super) fn since_s(&self) -> f64 {
         let fading = self.fading.iter().map(|(_, active)| active);
         let walks =
             self.people.iter().chain(fading).filter_map(|active| Some(active.steps().first()?.time_s));
         let candidates =
             self.candidates.iter().filter_map(|candidate| Some(candidate.seen.first()?.edges.time_s));
         let standing = self.standing.kept.first().map(|(_, edges)| edges.time_s);
-        let since_s = walks.chain(candidates).chain(standing).fold(f64::INFINITY, f64::min);
-        self.unfollowed.settle(since_s, self.options.start_frames);
+        walks.chain(candidates).chain(standing).fold(f64::INFINITY, f64::min)
     }
 
     /// Takes a walk back that was none.
