@@ -169,6 +169,8 @@ def test_camera_is_chosen_by_name(memo_command, video, tmp_path):
     ("arguments", "reason"),
     [
         (["--height", "170"], "looks like centimetres: give --height 1.7"),
+        (["--height", "1,75"], "--height 1,75: write decimal points, 1.75 for one height"),
+        (["--height", "2,2"], "--height 2,2: write decimal points"),
         (["--height", "0"], "height of a person in metres"),
         (["--height", "-1.7"], "height of a person in metres"),
         (["--height", "nan"], "height of a person in metres"),

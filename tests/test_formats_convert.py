@@ -30,13 +30,14 @@ def memo_command(memo_command):
     return run
 
 
-def write_track(folder, times_s=None):
-    """A folder as `memo track` writes it, with two walks."""
+def write_track(folder, times_s=None, person=0):
+    """A folder as `memo track` writes it, with two walks, the second one of this person."""
     folder.mkdir(exist_ok=True)
     points, _ = stick_figure(80, 25)
     columns = {name: np.zeros(len(FRAMES)) for name in TRACK_COLUMNS}
     columns |= {"frame": FRAMES, "time_s": FRAMES / 25 if times_s is None else times_s}
     columns["walk"] = (FRAMES >= 50).astype(int)
+    columns["person"] = person * columns["walk"]
     columns["right_knee_deg"] = FRAMES + 0.5
     for k, joint in enumerate(JOINTS):
         for i, axis in enumerate("xyz"):
@@ -65,6 +66,15 @@ def test_a_track_is_written_in_every_format(tmp_path, memo_command):
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == [
         f"walk.{ending}" for ending in ("c3d", "csv", "mot", "parquet", "sto", "trc")
     ]
+
+
+def test_two_people_are_not_one_skeleton(tmp_path, memo_command):
+    write_track(tmp_path / "run", person=1)
+    code, out, err = memo_command("convert", tmp_path / "run", tmp_path / "walk.trc")
+    assert (code, out) == (1, "") and not (tmp_path / "walk.trc").exists()
+    assert "the walks are those of 2 people: choose one of the walks 0 to 1" in err
+    code, out, err = memo_command("convert", tmp_path / "run", tmp_path / "walk.trc", "--walk", "1")
+    assert (code, err) == (0, "") and (tmp_path / "walk.trc").exists()
 
 
 def test_joints_get_the_names_of_pose2sim_and_keep_their_places(tmp_path, memo_command):

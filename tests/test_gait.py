@@ -5,6 +5,7 @@ import json
 import re
 import sys
 from itertools import pairwise
+from pathlib import Path
 
 import memo
 import numpy as np
@@ -244,3 +245,10 @@ def test_steps_that_are_hardly_visible_are_not_compared(monkeypatch):
     assert said in track.sentences
     monkeypatch.setattr(tracking, "cadence_sentences", lambda table, walk: [seen])
     assert said not in track.sentences and seen in track.sentences
+
+
+def test_the_definition_of_stance_states_the_errors_in_its_interval():
+    source = (Path(__file__).parents[1] / "crates/memo-core/src/track/decisions.rs").read_text()
+    for name in ("CONTACT_COMMON_SD_S", "TOE_OFF_COMMON_SD_S"):
+        (sd_s,) = re.findall(rf"const {name}: f64 = ([\d.]+);", source)
+        assert f"({1000 * float(sd_s):.0f} ms" in memo.gait.DEFINITIONS["stance"], name

@@ -190,5 +190,15 @@ def test_without_a_camera_a_height_is_measured_against_the_first_persons():
     (without,), (calibrated,) = (
         measured_height_sentences(measured, camera_given=given) for given in (False, True)
     )
-    assert "if the first person's height is right" in without and "standard deviation" not in without
+    assert "if the height of the other person" in without and "standard deviation" not in without
     assert "measured in the picture" in calibrated
+
+
+def test_who_has_no_height_of_their_own_is_told_apart_from_nobody_having_one():
+    assumed = walk(height=_memo.BodyHeight(1.70, 0.10, "assumed"))
+    for heights_given, why in [
+        (False, "No height and no camera were given"),
+        (True, "No height was given for this person, and no camera"),
+    ]:
+        (said,) = assumed_height_sentences(assumed, heights_given=heights_given)
+        assert said.startswith(f"{why}, so the person is taken to be 1.70 m tall")

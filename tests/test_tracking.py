@@ -286,3 +286,8 @@ def test_too_few_frames_are_said_with_their_number():
         "Nobody was seen walking: something moves in only 9 frames, and a walk is found in 13."
     )
     assert memo.track([frames[0]] * 9, fps=25, height_m=1.7).summary["message"] == "Nobody was seen walking."
+    tracker = memo.Tracker(1.7, start_frames=30)
+    for k, frame in enumerate(frames):
+        tracker.update(frame, k / 25)
+    assert repr(tracker) == "Tracker(seeking, 9 frames seen)"
+    assert tracker.finish().summary["message"].endswith("and a walk is found in 30.")

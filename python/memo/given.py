@@ -101,6 +101,10 @@ def heights(text: str | None) -> float | list[float] | None:
         each = [float(part) for part in text.split(",")]
     except ValueError:
         raise InputError(f"--height {text} is not a height in metres, or several as in 1.80,1.65") from None
+    if len(each) > 1 and not all("." in part for part in text.split(",")):
+        raise InputError(
+            f"--height {text}: write decimal points, 1.75 for one height and 1.80,1.65 for several people"
+        )
     return each[0] if len(each) == 1 else each
 
 

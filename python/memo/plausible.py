@@ -29,7 +29,9 @@ _LEG = 0.53
 _GRAVITY_MPS2 = 9.81
 
 
-def assumed_height_sentences(walk: Walk, *, camera_given: bool = False) -> list[str]:
+def assumed_height_sentences(
+    walk: Walk, *, camera_given: bool = False, heights_given: bool = False
+) -> list[str]:
     """Says that the height is that of an average person, if it is, and why."""
     height_m, sd_m = walk.height.height_m, walk.height.sd_m
     if walk.height.source != "assumed":
@@ -37,6 +39,8 @@ def assumed_height_sentences(walk: Walk, *, camera_given: bool = False) -> list[
     why = "No height and no camera were given"
     if camera_given:
         why = "No height was given, and the picture does not show it"
+    elif heights_given:
+        why = "No height was given for this person, and no camera"
     return [
         f"{why}, so the person is taken to be {height_m:.2f} m tall: all sizes, "
         f"distances and speeds may be too large or too small by {2 * sd_m / height_m:.0%} (two standard "
@@ -68,13 +72,14 @@ def tilt_sentences(tilt: CameraTilt | None) -> list[str]:
 def measured_height_sentences(walk: Walk, *, camera_given: bool = True) -> list[str]:
     """The measured height, where none was given, or where it contradicts the given one.
 
-    Without a given camera, the first person's height gives the scale of everybody else.
+    Without a given camera, the height of somebody who was followed at that time gives the scale.
     """
     height = walk.height
     if height.source == "measured" and not camera_given:
         return [
-            f"The person is {height.height_m:.2f} m tall if the first person's height is right: without a "
-            "calibrated camera, it is measured against that height and as wrong as that one."
+            f"The person is {height.height_m:.2f} m tall if the height of the other person, who was followed "
+            "at that time, is right: without a calibrated camera, it is measured against that height and as "
+            "wrong as that one."
         ]
     if height.source == "measured":
         return [

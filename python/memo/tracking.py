@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import logging
-from collections.abc import Callable, Iterable, Sequence, Sized
+from collections.abc import Callable, Iterable, Mapping, Sequence, Sized
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -152,6 +152,7 @@ class Tracker:
             self._camera,
             camera_motion=motion,
             left_out=[LeftOut.of(left) for left in self._core.left_out()],
+            options=self.options,
         )
         if _log.isEnabledFor(logging.INFO):
             for sentence in found.sentences:
@@ -161,8 +162,7 @@ class Tracker:
     def __repr__(self) -> str:
         seen = self._core.seek_report().frames
         return (
-            f"Tracker({'following' if self._core.people() else 'seeking'}, "
-            f"{counted(seen, 'frame')} without a walker)"
+            f"Tracker({'following' if self._core.people() else 'seeking'}, {counted(seen, 'frame')} seen)"
         )
 
 
@@ -311,12 +311,14 @@ class Track:
         video_size: tuple[int, int] | None = None,
         camera_motion: CameraMotion | None = None,
         left_out: Sequence[LeftOut] = (),
+        options: Mapping[str, Any] | None = None,
     ) -> None:
         self.walks: list[_memo.Walk] = list(walks)
         self.seek_report: _memo.SeekReport = seek_report
         self.shrink: int = shrink
         """Pixels of the video per pixel of a given frame, per axis: 1 unless set by `of_video`."""
         self._camera = camera
+        self._options: Mapping[str, Any] = _memo.defaults("track") if options is None else options
         self._video_size = video_size
         self.camera_motion: CameraMotion = camera_motion or CameraMotion()
         """The camera in every frame; the world of the results is that of the first one."""
@@ -339,6 +341,7 @@ class Track:
             video_size=size,
             camera_motion=motion,
             left_out=[left.of_video(shrink // self.shrink) for left in self.left_out],
+            options=self._options,
         )
 
     @property
@@ -419,7 +422,9 @@ class Track:
             return [self.summary["message"], *said, *left_out]
         for index, walk in enumerate(self.walks):
             camera_given = self.camera_motion.camera_given
-            told = assumed_height_sentences(walk, camera_given=camera_given)
+            told = assumed_height_sentences(
+                walk, camera_given=camera_given, heights_given=self._options.get("height_m") is not None
+            )
             told += [sentence for sentence in [fit_sentence(walk)] if sentence is not None]
             told += [self._message(walk), *self._joined(index)]
             told += measured_height_sentences(walk, camera_given=self._camera is not None)
@@ -627,7 +632,7 @@ class Track:
     def _nobody_message(self) -> str:
         if moved := over_ground(self.left_out):
             return moved
-        moving, needed = self.seek_report.frames_with_candidate, int(_memo.defaults("track")["start_frames"])
+        moving, needed = self.seek_report.frames_with_candidate, int(self._options["start_frames"])
         why = self._why_nobody()
         if why == "nobody" and 0 < moving < needed:
             return (

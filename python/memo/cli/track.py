@@ -110,7 +110,7 @@ def add_track(app: "typer.Typer") -> None:
         quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
     ) -> None:
         """Tracks everybody who walks through VIDEO."""
-        delivery = Delivery(out or Path("memo-out") / video.stem, overlay, plots, as_json, quiet)
+        delivery = Delivery(out or Path("memo-out") / video.resolve().stem, overlay, plots, as_json, quiet)
 
         def work() -> Exit:
             reading = {"name": camera_name, "unit": camera_unit, "size": camera_size, "v_up": camera_v_up}

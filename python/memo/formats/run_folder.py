@@ -74,6 +74,10 @@ def _track(table: Path, events_table: Path, walk: int | None) -> Motion:
     if not chosen.any():
         raise FormatError(f"there is no walk {walk}, only {columns['walk'].min()} to {columns['walk'].max()}")
     times_s = columns["time_s"][chosen]
+    people = np.unique(columns["person"][chosen]) if "person" in columns else []
+    if len(people) > 1:
+        last = columns["walk"].max()
+        raise FormatError(f"the walks are those of {len(people)} people: choose one of the walks 0 to {last}")
     if (np.diff(times_s) <= 0).any():
         last = columns["walk"].max()
         raise FormatError(f"several people walk at the same time: choose one of the walks 0 to {last}")
