@@ -197,6 +197,49 @@ def test_mistakes_are_told_in_one_line(memo_command, video, tmp_path, monkeypatc
     assert complaint.startswith("memo: ") and complaint.count("\n") == 1 and reason in complaint
 
 
+@pytest.mark.parametrize("given", ["video", "--boxes", "--camera"])
+def test_results_never_replace_what_they_come_from(memo_command, video, tmp_path, given):
+    """The name of the input is that of a file which `memo track` writes or removes."""
+    folder = tmp_path / "run"
+    folder.mkdir()
+    name, content = {
+        "video": ("overlay.mp4", video.read_bytes()),
+        "--boxes": ("track.csv", b"1,-1,5,5,20,20,1\n"),
+        "--camera": ("run.json", CAMERA.encode()),
+    }[given]
+    source = folder / name
+    source.write_bytes(content)
+    more = {"video": (source,), "--boxes": (video, "--boxes", source)}
+    more["--camera"] = (video, "--camera", source, "--camera-name", "side")
+    code, said, complaint = memo_command("track", *more[given], "--out", folder)
+    assert (code, said) == (1, "")
+    assert complaint == f"memo: {source}: is the input; write to another place\n"
+    assert [path.name for path in folder.iterdir()] == [name] and source.read_bytes() == content
+    link = tmp_path / "link"
+    link.symlink_to(folder, target_is_directory=True)
+    assert memo_command("track", *more[given], "--out", link)[0] == 1
+    assert source.read_bytes() == content
+
+
+def test_results_do_not_go_among_the_images_of_the_video(memo_command, luma_frames, tmp_path):
+    frames = tmp_path / "frames"
+    frames.mkdir()
+    names = ("angles.png", "motion.png", "similarity.png", "start.png")
+    for name, luma in zip(names, luma_frames(count=4), strict=True):
+        with av.open(str(frames / name), "w", format="image2", options={"update": "1"}) as container:
+            stream = container.add_stream("png", rate=1)
+            stream.height, stream.width = luma.shape
+            stream.pix_fmt = "gray"
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(luma, format="gray")))
+            container.mux(stream.encode(None))
+    before = {path.name: path.read_bytes() for path in frames.iterdir()}
+    code, _, complaint = memo_command("track", frames, "--fps", "25", "--out", frames)
+    assert code == 1 and complaint == f"memo: {frames}: is the input folder; write to another place\n"
+    assert {path.name: path.read_bytes() for path in frames.iterdir()} == before
+    assert memo_command("track", frames, "--fps", "25", "--out", frames / "run")[0] == 0
+    assert before.items() <= {path.name: path.read_bytes() for path in frames.glob("*.png")}.items()
+
+
 def test_bad_videos_are_told_in_one_line(memo_command, tmp_path):
     for name in ("absent.mp4", "text.mp4"):
         (tmp_path / "text.mp4").write_text("no video " * 99)

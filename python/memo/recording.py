@@ -25,8 +25,9 @@ from memo.cycles import write_cycles_csv
 from memo.exits import Exit
 from memo.files import write_events_csv, write_track_csv
 from memo.gait import write_gait_parameters_csv
-from memo.given import InputError, check_writable, nothing_at
+from memo.given import InputError, check_apart, check_writable, nothing_at
 from memo.left_out import LeftOut
+from memo.run import NAME as RUN
 from memo.run import Source, write_run
 
 if TYPE_CHECKING:
@@ -44,6 +45,7 @@ __all__ = [
     "write_tables",
 ]
 
+_TABLES = ("track.csv", "events.csv", "gait_parameters.csv", "cycles.csv")
 _DRAWN = (
     "camera_motion.csv",
     "overlay.mp4",
@@ -100,6 +102,8 @@ class Recording:
     """Of several people, only the one who is there."""
     boxes: Path | None = None
     """MOTChallenge rows of the boxes around people, in place of looking for what moves."""
+    camera_file: Path | None = None
+    """The file that the camera was read from, if any; results do not overwrite it."""
 
 
 @dataclass
@@ -165,7 +169,9 @@ def track_recording(
 ) -> Recorded:
     """Tracks a video and writes the results into the folder `out`.
 
-    If stopped after a frame, it writes the tables of what was tracked until then, and draws nothing.
+    Refuses a folder where they would replace the video, the boxes or the camera file, or lie among the images
+    of the video. If stopped after a frame, it writes the tables of what was tracked until then, and draws
+    nothing.
     """
     from memo.video import VideoDamageWarning
 
@@ -186,6 +192,8 @@ def _track_recording(
     video = recording.video
     if not video.exists():
         raise InputError(nothing_at(video))
+    written = [out / name for name in (*_TABLES, RUN, *_DRAWN)]
+    check_apart([video, recording.boxes, recording.camera_file], written)
     check_writable(out)
 
     def opened() -> VideoReader:
@@ -423,8 +431,7 @@ def write_tables(recorded: Recorded, out: Path) -> None:
     """Writes the tables and run.json; removes pictures and the camera's motion of an earlier run."""
     for stale in _DRAWN:  # from an earlier run: they do not match the new tables
         (out / stale).unlink(missing_ok=True)
-    names = ("track.csv", "events.csv", "gait_parameters.csv", "cycles.csv")
-    table, events, gait, cycles = (out / name for name in names)
+    table, events, gait, cycles = (out / name for name in _TABLES)
     write_track_csv(table, recorded.columns)
     write_events_csv(events, recorded.events)
     write_gait_parameters_csv(gait, recorded.gait_parameters)

@@ -66,6 +66,7 @@ def _track(arguments: Sequence[str]) -> Exit:
             frame_range(options.pop("frames", ":")),
             page=options.pop("report", False),
             follow=None if follow is None else Point(*point_in_frame(follow)),
+            camera_file=camera,
             **options,
         )
         recorded = track_recording(recording, Path(out), remark=_complain)

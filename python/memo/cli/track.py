@@ -117,7 +117,8 @@ def add_track(app: "typer.Typer") -> None:
             options = tracker_options(heights(height), camera, reading, fov_deg, steady, treadmill)
             asked = frame_range(frames)
             point = None if follow is None else Point(*point_in_frame(follow))
-            recording = Recording(video, options, asked, fps, shrink, overlay, plots, page, point, boxes)
+            drawn = (overlay, plots, page)
+            recording = Recording(video, options, asked, fps, shrink, *drawn, point, boxes, camera)
             return _track(recording, delivery)
 
         raise typer.Exit(guarded(work))
