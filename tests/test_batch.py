@@ -608,6 +608,31 @@ def test_where_it_does_not_start(lab, monkeypatch):
     assert not lab.out.exists()
 
 
+def test_no_input_is_where_results_go(lab):
+    lab.videos("ok")
+    lab.run()
+    (lab.out / "walk").mkdir()
+    (lab.out / "walk" / "0001.png").write_text("a picture")
+    given = {
+        "a video": {"video": lab.out / "v00" / "track.csv", "name": "v00"},
+        "images": {"video": lab.out / "walk", "fps": 25},
+        "a camera": {"video": lab.folder / "v00.mp4", "camera": lab.out / "v00" / "run.json"},
+        "boxes": {"video": lab.folder / "v00.mp4", "boxes": lab.out / "status.csv"},
+    }
+    before = {path: path.read_bytes() for path in lab.out.rglob("*") if path.is_file()}
+    for row in given.values():
+        # `skip_bad`: the content of these files is not what is tested.
+        with pytest.raises(batch.ManifestError, match=r"row 1: .*: is where results go \(.*give another"):
+            batch.run([row], lab.out, command=lab.command, resume=True, skip_bad=True)
+    assert {path: path.read_bytes() for path in lab.out.rglob("*") if path.is_file()} == before
+    lab.manifest.write_text(f"video,fps\n{lab.out / 'walk'},25\n")
+    checked = subprocess.run(
+        memo_command(lab.manifest, "--check", "--out", lab.out), capture_output=True, text=True
+    )
+    assert checked.returncode == 1 and "walks.csv, line 2: " in checked.stderr
+    assert "is where results go" in checked.stderr
+
+
 def test_a_disk_that_fills_up_stops_the_run_and_not_the_videos(lab, monkeypatch):
     lab.videos("ok", "fails", "ok", "ok")
     usage, full = shutil.disk_usage("/"), lab.out / "v00"

@@ -17,7 +17,7 @@ from typing import Any
 
 from memo._memo import __version__
 from memo.batch.folder import STATES, BatchError, OutFolder, Record, check_ours
-from memo.batch.manifest import Manifest, ManifestError, Row, read_manifest
+from memo.batch.manifest import TAKEN, Manifest, ManifestError, Row, read_manifest
 from memo.batch.tables import write_status, write_table
 from memo.batch.task import Task, perform
 from memo.wording import counted
@@ -133,6 +133,7 @@ def run(
     folder = OutFolder(out.absolute(), shard)
     mine = read.rows[shard[0] - 1 :: shard[1]]
     resume = resume or retry_failed
+    check_inputs(folder.out, read.rows)
     check_folder(folder.out, [row for row in mine if folder.record(row.name) is None])
     with folder.taken() as name:
         known = _known(mine, folder, out, resume)
@@ -294,6 +295,19 @@ def _notes(
     if older:
         notes.append(f"Some videos were tracked by memo {', '.join(sorted(older))}, not {__version__}.")
     return notes
+
+
+def check_inputs(out: Path, rows: Sequence[Row]) -> None:
+    """Refuses input in the places of results, which are removed before a video is tracked."""
+    places = {(out / name).resolve() for name in (*TAKEN, *(row.name for row in rows))}
+    problems = []
+    for row in rows:
+        for file in (row.video, *(value for value in row.options.values() if isinstance(value, Path))):
+            lies_in = [file.resolve(), *file.resolve().parents]
+            if place := next((place for place in lies_in if place in places), None):
+                problems.append(f"{row.place}: {file}: is where results go ({place}); give another folder")
+    if problems:
+        raise ManifestError(problems)
 
 
 def check_folder(out: Path, to_do: Sequence[Row]) -> None:

@@ -63,7 +63,9 @@ OPTIONS = {
 
 _KNOWN = ("video", "name", *OPTIONS)
 _TRUTHS = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
-_TAKEN = ("logs", "status.csv", "gait_parameters.csv")  # reserved names in the folder of results
+TAKEN = (".batch", "logs", "status.csv", "gait_parameters.csv")
+"""Reserved names in the folder of results."""
+
 _LONGEST_NAME = 150  # bytes; file systems allow 255, and temporary names are a little longer
 
 
@@ -384,7 +386,7 @@ def _name_problems(rows: list[Row]) -> list[str]:
     for row in rows:
         alike[row.name.casefold()].append(row)
         unfit = re.search(r"[/\\:*?\"<>|\x00-\x1f]", row.name) or row.name.startswith(".")
-        if unfit or row.name.casefold() in _TAKEN or not 0 < len(row.name.encode()) <= _LONGEST_NAME:
+        if unfit or row.name.casefold() in TAKEN or not 0 < len(row.name.encode()) <= _LONGEST_NAME:
             problems.append(
                 f"{row.place}: {row.name!r} cannot be the name of a folder here; give another name"
             )

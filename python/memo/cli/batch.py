@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from memo.batch import OPTIONS, BatchResult, ManifestError, Progress, RayExecutor, Record, run
-from memo.batch.engine import check_folder, default_out, described, notes_on, prepared
+from memo.batch.engine import check_folder, check_inputs, default_out, described, notes_on, prepared
 from memo.cli.delivery import Delivery, complain, guarded, terminal
 from memo.exits import Exit
 from memo.given import InputError
@@ -140,6 +140,7 @@ def _parsed_shard(text: str) -> tuple[int, int]:
 def _check(manifest: Path, delivery: Delivery) -> Exit:
     """Reports what is wrong with the manifest, and where results would be written."""
     read = prepared(manifest, overlay=delivery.overlay, plots=delivery.plots)
+    check_inputs(delivery.out, read.rows)
     check_folder(delivery.out, read.rows)
     if delivery.as_json:
         print(json.dumps({"videos": len(read.rows), "names": [row.name for row in read.rows]}))
