@@ -161,9 +161,7 @@ class Tracker:
 
     def __repr__(self) -> str:
         seen = self._core.seek_report().frames
-        return (
-            f"Tracker({'following' if self._core.people() else 'seeking'}, {counted(seen, 'frame')} seen)"
-        )
+        return f"Tracker({'following' if self._core.people() else 'seeking'}, {counted(seen, 'frame')} seen)"
 
 
 def track(
