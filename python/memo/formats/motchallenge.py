@@ -4,8 +4,9 @@
 people and pixels are counted from 1; x, y, z is the position of the feet, in metres, -1 if unknown.)
 
 Of a track, one row per frame and person is written: `id` 1 for the first person, in all of that person's
-walks; the box of the model's visible contours; the point on the ground below the torso; the track's similarity
-as `conf`. For a folder of `memo track` the contours are computed again, with the person and camera in `run.json`.
+walks; the box of the model's visible contours; the point on the ground below the torso; the track's
+similarity as `conf`. For a folder of `memo track` the contours are computed again, with the person and camera
+in `run.json`.
 
 Limits: boxes are not clipped to the picture (no field has its size); x and y have no uncertainty.
 """
