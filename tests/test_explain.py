@@ -9,7 +9,7 @@ from pathlib import Path
 import memo
 import numpy as np
 import pytest
-from conftest import ran, shared_video
+from conftest import SHARED_DATA, ran, shared_video
 from memo import _memo
 from memo.explain import Why, explain
 from memo.files import read_track_csv
@@ -120,6 +120,21 @@ def test_chosen_frames_come_one_by_one(run):
     assert [why.frame for why in found] == [40]
     assert progress[-1][0] == progress[-1][1]
     assert list(explain(run, [])) == []
+
+
+def test_pictures_of_a_camera_in_the_hand_are_steadied_as_they_were(tmp_path):
+    scene = SHARED_DATA / "people" / "shake3"
+    if not scene.is_dir():
+        pytest.skip(f"no scene in {scene} (set MEMO_SHARED_DATA)")
+    options = ["--camera", scene / "camera.toml", "--height", "1.84", "--no-overlay", "--no-plots", "--quiet"]
+    ran("track", scene / "video.mp4", *options, "--out", tmp_path)
+    rows = read_track_csv(tmp_path / "track.csv")
+    asked = rows["frame"][::20].tolist()
+    found = {why.frame: why.chosen_similarity for why in explain(tmp_path, asked)}
+    for frame, similarity in zip(rows["frame"], rows["similarity"], strict=True):
+        if frame in found:
+            assert abs(found.pop(frame) - similarity) < 1e-3
+    assert not found
 
 
 def test_the_last_frame_has_no_next_one(run, whys):

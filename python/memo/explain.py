@@ -132,7 +132,7 @@ def explain(
     path = _video(run, file, video)
     try:
         # Older runs took the frames as they were.
-        tracker = _memo.Tracker(**{"steady": False, **run["options"]})
+        tracker = _memo.Tracker(camera=_given_camera(run), **{"steady": False, **run["options"]})
         explainer = _memo.Explainer(tracker, run["walks"], {frame - first for frame in wanted})
     except (TypeError, ValueError, OverflowError) as error:
         raise RunError(f"{file}: {error}") from None
@@ -143,6 +143,13 @@ def explain(
         return iter(())
     reader = VideoReader(path, start=first, stop=stop, rate_hz=run["fps_given"])
     return _explained(run, file, reader, stop - first, wanted, explainer, progress)
+
+
+def _given_camera(run: dict[str, Any]) -> _memo.Camera | None:
+    """The given camera, of the tracked pictures: with its lens, those of a moving camera are steadied."""
+    if not run["camera_given"] or run["camera"] is None:
+        return None
+    return _memo.Camera.from_parameters(run["camera"]).shrunk(run["shrink"])
 
 
 def _video(run: dict[str, Any], file: Path, given: str | PathLike[str] | None) -> Path:
