@@ -140,6 +140,16 @@ def test_dots_with_a_lifetime_are_shown(command, tmp_path):
         assert code == 0 and said.startswith(f"{count} dots in 12 frames.")
 
 
+@pytest.mark.parametrize(
+    ("line", "file"),
+    [("pointlight dots.csv --out .", "dots.csv"), ("planar points3d.csv --out .", "points3d.csv")],
+)
+def test_results_do_not_replace_the_motion_they_come_from(command, tmp_path, line, file):
+    (tmp_path / file).write_text("time_s,a_u_px,a_v_px\n0,1,2\n")
+    assert command(line) == (1, f"memo: {file}: is the input; write to another place\n")
+    assert [path.name for path in tmp_path.iterdir()] == [file]
+
+
 def test_the_help_of_the_manifest_names_every_column(command):
     _, said = command("batch --help")
     words = set(re.findall(r"[a-z_]+", said))

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 __all__ = [
+    "WRITTEN",
     "FigureLink",
     "PlanarFigure",
     "Points",
@@ -298,6 +299,10 @@ def write_points_csv(path: str | PathLike[str], points: Points) -> None:
     write_table(path, header, rows)
 
 
+WRITTEN = ("windows.csv", "links.csv", "chains.csv", "points3d.csv")
+"""The files that `write_figure_csv` writes."""
+
+
 def write_figure_csv(out: Path, figure: PlanarFigure, points: Points) -> list[Path]:
     """Writes links.csv, chains.csv, windows.csv and points3d.csv, all at scale 1; returns their paths."""
     points = points.at_one_scale()
@@ -323,7 +328,7 @@ def write_figure_csv(out: Path, figure: PlanarFigure, points: Points) -> list[Pa
                 numbers = [link.length, link.length_sd, link.margin, link.confidence]
                 labels = [str(number), window.status, name(a), name(b), chain.verdict]
                 links.append([*labels, *_cells(numbers)])
-    written = [out / file for file in ("windows.csv", "links.csv", "chains.csv", "points3d.csv")]
+    written = [out / file for file in WRITTEN]
     window_header = ["window", "start_s", "end_s", "status", "method", "planar", "refuted", "undecided"]
     window_header += ["evidence_nats", "least_nats"]
     write_table(written[0], window_header, windows)

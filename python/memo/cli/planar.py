@@ -11,7 +11,7 @@ import memo
 from memo.cli.delivery import Delivery, guarded, with_count
 from memo.cli.unswap import one_of_several
 from memo.exits import Exit
-from memo.given import InputError, check_writable
+from memo.given import InputError, check_apart, check_writable
 from memo.wording import counted
 
 if TYPE_CHECKING:
@@ -25,6 +25,8 @@ EPILOG = """Examples:
 
 Exit codes: 0 a linkage was found; 1 the input cannot be used; 2 wrong usage; \
 3 no window shows a body; 4 the app extra is not installed."""
+
+_DRAWN = ("linkage.png", "turned.mp4", "turned.png")
 
 
 def add_planar(app: "typer.Typer") -> None:
@@ -99,11 +101,13 @@ def _planar(
     options: dict[str, Any],
     delivery: Delivery,
 ) -> Exit:
-    from memo.linkage import JOINT_NAMES, write_figure_csv
+    from memo.linkage import JOINT_NAMES, WRITTEN, write_figure_csv
     from memo.linkage_plot import write_linkage_png, write_turned_png, write_turned_video
 
     _check(options["focal_px"], turn_deg)
-    (points, who), out = _read(tracks, reading), delivery.out
+    out = delivery.out
+    check_apart([tracks], [out / name for name in (*WRITTEN, *_DRAWN)])
+    points, who = _read(tracks, reading)
     if names and not any(name in JOINT_NAMES for name in points.names):
         raise InputError(f"{tracks}: no column names a joint (RKN or right_knee): leave --names out")
     check_writable(out)
@@ -112,7 +116,7 @@ def _planar(
     with with_count("looking for limbs", delivery) as progress:
         figure = memo.planar(points.positions, points.times_s, noise_px, progress=progress, **options)
     written = write_figure_csv(out, figure, points)
-    for stale in ("linkage.png", "turned.mp4", "turned.png"):  # of an earlier run
+    for stale in _DRAWN:  # of an earlier run
         (out / stale).unlink(missing_ok=True)
     if figure.windows:
         write_linkage_png(out / "linkage.png", points, figure)

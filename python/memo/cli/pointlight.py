@@ -18,7 +18,7 @@ import memo
 from memo.cli.delivery import Delivery, guarded
 from memo.exits import Exit
 from memo.files import write_table
-from memo.given import InputError, UsageError, check_writable, nothing_at
+from memo.given import InputError, UsageError, check_apart, check_writable, nothing_at
 from memo.wording import counted
 
 if TYPE_CHECKING:
@@ -39,6 +39,7 @@ MOST_DOTS = 16
 """`memo planar` gives no verdict on more dots."""
 
 _SECONDS = 2.4
+_TABLES = ("dots.csv", "labels.csv")
 
 _MOST_SPEED_MPS = 4.0
 """Of people who walk: race walkers."""
@@ -313,6 +314,8 @@ def add_pointlight(app: "typer.Typer") -> None:
                 "smooth": not hard,
             }
             notes: list[str] = []
+            read = [path for path in (*(motion or ()), markers) if path is not None and path.is_file()]
+            check_apart(read, [out / name for name in _TABLES])
             if motion:
                 actors, notes = _read_actors(motion, markers, fps)
             else:
@@ -349,7 +352,7 @@ def _deliver(
     shown, labels = display.positions_px, display.labels
     stays = bool((labels == labels[0]).all()) and options["lifetime_frames"] is None
     named = [names[k] if stays and k >= 0 else f"dot{i:02d}" for i, k in enumerate(labels[0])]
-    written = [out / "dots.csv", out / "labels.csv", out / f"display.{'mkv' if lossless else 'mp4'}"]
+    written = [*(out / name for name in _TABLES), out / f"display.{'mkv' if lossless else 'mp4'}"]
     write_points_csv(written[0], Points(named, display.times_s, shown))
     _write_labels(written[1], names, named, display)
     write_display_video(written[2], display, lossless=lossless, **picture)
