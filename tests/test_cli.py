@@ -124,6 +124,24 @@ def test_results_go_to_memo_out_by_default(memo_command, video, tmp_path, monkey
     assert {path.name for path in (tmp_path / "memo-out" / "walk").iterdir()} == TABLES
 
 
+@pytest.mark.parametrize("source", [".", "..", "../walk", "link"])
+def test_results_of_a_folder_have_its_name_however_it_is_given(
+    memo_command, luma_frames, tmp_path, monkeypatch, source
+):
+    walk = tmp_path / "walk"
+    (walk / "sub").mkdir(parents=True)
+    for number, luma in enumerate(luma_frames(count=4)):
+        height, width = luma.shape
+        (walk / f"{number}.pgm").write_bytes(b"P5 %d %d 255\n" % (width, height) + luma.tobytes())
+    (walk / "link").symlink_to(walk)
+    here = walk / "sub" if source == ".." else walk
+    monkeypatch.chdir(here)
+    assert memo_command("track", source, "--fps", "25", "--no-overlay", "--no-plots")[0] == 0
+    name = "link" if source == "link" else "walk"
+    assert {path.name for path in (here / "memo-out").iterdir()} == {name}
+    assert {path.name for path in (here / "memo-out" / name).iterdir()} == TABLES
+
+
 def test_chosen_frames_keep_their_numbers(memo_command, video, tmp_path):
     assert memo_command("track", video, "--frames", "5:12", "--out", tmp_path / "out")[0] == 0
     columns = read_track_csv(tmp_path / "out" / "track.csv")

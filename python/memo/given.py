@@ -24,6 +24,7 @@ __all__ = [
     "check_writable",
     "checked_fov",
     "checked_height",
+    "default_out",
     "frame_range",
     "given_camera",
     "heights",
@@ -186,6 +187,11 @@ def check_apart(read: Iterable[Path | None], written: Iterable[Path]) -> None:
                 raise InputError(f"{file}: is the input; write to another place")
             if source.is_dir() and file.parent.resolve() == source.resolve():
                 raise InputError(f"{source}: is the input folder; write to another place")
+
+
+def default_out(source: Path) -> Path:
+    """The folder for the results of a source, named like it; also `.` and `..` have a name."""
+    return Path("memo-out") / Path(os.path.abspath(source)).stem
 
 
 _LEAST_FREE_BYTES = 4 << 20  # tables and pictures of a short video

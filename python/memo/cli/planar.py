@@ -11,7 +11,7 @@ import memo
 from memo.cli.delivery import Delivery, guarded, with_count
 from memo.cli.unswap import one_of_several
 from memo.exits import Exit
-from memo.given import InputError, check_apart, check_writable
+from memo.given import InputError, check_apart, check_writable, default_out
 from memo.wording import counted
 
 if TYPE_CHECKING:
@@ -81,9 +81,7 @@ def add_planar(app: "typer.Typer") -> None:
     ) -> None:
         """Links unnamed points into limbs that swing in planes, with lengths and depths."""
         options = {"window_s": window, "carry": carry, "focal_px": focal_px}
-        delivery = Delivery(
-            out or Path("memo-out") / tracks.stem, overlay=video, as_json=as_json, quiet=quiet
-        )
+        delivery = Delivery(out or default_out(tracks), overlay=video, as_json=as_json, quiet=quiet)
 
         def work() -> Exit:
             reading = reading_of(fps, layout, person, image_size)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from memo.cli.delivery import Delivery, Interrupt, complain, guarded, with_steps
 from memo.exits import Exit
-from memo.given import frame_range, heights, point_in_frame, tracker_options
+from memo.given import default_out, frame_range, heights, point_in_frame, tracker_options
 from memo.recording import Point, Recorded, Recording, track_recording
 
 if TYPE_CHECKING:
@@ -110,7 +110,7 @@ def add_track(app: "typer.Typer") -> None:
         quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
     ) -> None:
         """Tracks everybody who walks through VIDEO."""
-        delivery = Delivery(out or Path("memo-out") / video.resolve().stem, overlay, plots, as_json, quiet)
+        delivery = Delivery(out or default_out(video), overlay, plots, as_json, quiet)
 
         def work() -> Exit:
             reading = {"name": camera_name, "unit": camera_unit, "size": camera_size, "v_up": camera_v_up}
