@@ -10,7 +10,14 @@ import ezc3d
 import numpy as np
 import pandas
 import pytest
-from memo.files import JOINTS, TRACK_COLUMNS, write_columns_csv, write_events_csv, write_track_csv
+from memo.files import (
+    JOINTS,
+    TRACK_COLUMNS,
+    read_track_csv,
+    write_columns_csv,
+    write_events_csv,
+    write_track_csv,
+)
 from memo.formats import READERS, WRITERS, Motion, read_motion, write_motion
 from memo.formats.clinical import PELVIC_TILT_DEG
 from motions import shared_motion, stick_figure, walk
@@ -30,14 +37,13 @@ def memo_command(memo_command):
     return run
 
 
-def write_track(folder, times_s=None, person=0):
-    """A folder as `memo track` writes it, with two walks, the second one of this person."""
+def write_track(folder, times_s=None):
+    """A folder as `memo track` writes it, with two walks."""
     folder.mkdir(exist_ok=True)
     points, _ = stick_figure(80, 25)
     columns = {name: np.zeros(len(FRAMES)) for name in TRACK_COLUMNS}
     columns |= {"frame": FRAMES, "time_s": FRAMES / 25 if times_s is None else times_s}
     columns["walk"] = (FRAMES >= 50).astype(int)
-    columns["person"] = person * columns["walk"]
     columns["right_knee_deg"] = FRAMES + 0.5
     for k, joint in enumerate(JOINTS):
         for i, axis in enumerate("xyz"):
@@ -55,7 +61,7 @@ def test_a_track_is_written_in_every_format(tmp_path, memo_command):
         code, out, err = memo_command("convert", tmp_path / "run", target)
         assert (code, err) == (0, "")
         assert "Read 55 frames, 12 points, 10 joint angles, 2 events, 0.40 to 2.96 s." in out
-        assert "2 walks: between them nobody was tracked." in out
+        assert "2 walks: between them the person was not tracked." in out
         up = "Z" if ending in ("c3d", "csv", "parquet") else "Y"
         assert out.endswith(f"Written to {target}, {up} up.\n")
         read = read_motion(target)
@@ -66,15 +72,6 @@ def test_a_track_is_written_in_every_format(tmp_path, memo_command):
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == [
         f"walk.{ending}" for ending in ("c3d", "csv", "mot", "parquet", "sto", "trc")
     ]
-
-
-def test_two_people_are_not_one_skeleton(tmp_path, memo_command):
-    write_track(tmp_path / "run", person=1)
-    code, out, err = memo_command("convert", tmp_path / "run", tmp_path / "walk.trc")
-    assert (code, out) == (1, "") and not (tmp_path / "walk.trc").exists()
-    assert "the walks are those of 2 people: choose one of the walks 0 to 1" in err
-    code, out, err = memo_command("convert", tmp_path / "run", tmp_path / "walk.trc", "--walk", "1")
-    assert (code, err) == (0, "") and (tmp_path / "walk.trc").exists()
 
 
 def test_joints_get_the_names_of_pose2sim_and_keep_their_places(tmp_path, memo_command):
@@ -224,6 +221,21 @@ def test_one_walk_its_events_and_the_summary_as_json(tmp_path, memo_command):
     assert file["parameters"]["POINT"]["Y_SCREEN"]["value"] == ["+Y"]
     code, _, err = memo_command("convert", tmp_path / "run", target, "--walk", 7)
     assert code == 1 and "there is no walk 7, only 0 to 1" in err
+
+
+@pytest.mark.parametrize("at_once", [False, True])
+def test_walks_of_different_people_are_not_joined(tmp_path, memo_command, at_once):
+    times_s = FRAMES / 25 - (1.6 if at_once else 0.0) * (FRAMES >= 50)
+    write_track(tmp_path / "run", times_s)
+    columns = read_track_csv(tmp_path / "run" / "track.csv")
+    write_track_csv(tmp_path / "run" / "track.csv", columns | {"person": columns["walk"]})
+    for target in ("a.trc", "a.csv", "a.bvh"):
+        code, said, err = memo_command("convert", tmp_path / "run", tmp_path / target)
+        assert (code, said) == (1, "") and not (tmp_path / target).exists()
+        assert "walks 0 and 1 are of different people: choose one of the walks 0 to 1 (memo convert " in err
+        assert "--walk" in err and "memo track --follow" in err
+        assert memo_command("convert", tmp_path / "run", tmp_path / target, "--walk", 1, "--quiet")[0] == 0
+    assert len(read_motion(tmp_path / "a.csv").times_s) == 25
 
 
 def test_bvh_takes_one_walk_or_says_why_not(tmp_path, memo_command):

@@ -122,7 +122,7 @@ def whole_files(folder, ending):
     """Small files without damage; of C3D also those of other processors."""
     if ending == "track.csv":
         columns = {name: np.arange(6.0) for name in TRACK_COLUMNS}
-        columns |= {"frame": np.arange(6), "walk": np.array([0, 0, 0, 1, 1, 1])}
+        columns |= {"frame": np.arange(6), "walk": np.array([0, 0, 0, 1, 1, 1]), "person": np.zeros(6, int)}
         write_track_csv(folder / "whole.csv", columns)
         return [(folder / "whole.csv").read_bytes()]
     files = []

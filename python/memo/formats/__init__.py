@@ -85,9 +85,9 @@ def read_motion(
 
     `up`: the file's up axis, in place of the one it names. `rate_hz`: frame rate of an AMC file, or of a
     table without times. `unit_m`: metres in one unit of a BVH or AMC file, or of a table that names none.
-    `walk`: one walk of a track, from 0; all of them otherwise. `markers`: names of the points at whose mean a
-    joint is, such as `{"right_hip": ["RASI"]}`, in files with names of their own: figures are measured by
-    them if a file names neither unit nor up axis.
+    `walk`: one walk of a track, from 0; all of them otherwise, if they are of one person. `markers`: names of
+    the points at whose mean a joint is, such as `{"right_hip": ["RASI"]}`, in files with names of their own:
+    figures are measured by them if a file names neither unit nor up axis.
     """
     path = Path(path)
     check_up(up)

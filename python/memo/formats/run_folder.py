@@ -1,7 +1,8 @@
 """The folders that `memo track` and `memo posture` write, as motions.
 
-Several walks of one `track.csv` are one motion; between them nobody was tracked and there are no frames.
-For formats that need a frame at every instant, those frames are empty.
+Several walks of one person in a `track.csv` are one motion; between them the person was not tracked and there
+are no frames. For formats that need a frame at every instant, those frames are empty. Of the walks of several
+people, one must be chosen.
 """
 
 from __future__ import annotations
@@ -73,14 +74,17 @@ def _track(table: Path, events_table: Path, walk: int | None) -> Motion:
         raise FormatError("track.csv has no frames: nobody was tracked")
     if not chosen.any():
         raise FormatError(f"there is no walk {walk}, only {columns['walk'].min()} to {columns['walk'].max()}")
-    times_s = columns["time_s"][chosen]
-    people = np.unique(columns["person"][chosen]) if "person" in columns else []
+    one_of = f"choose one of the walks 0 to {columns['walk'].max()} (memo convert --walk)"
+    people, first = np.unique(columns["person"][chosen], return_index=True)
     if len(people) > 1:
-        last = columns["walk"].max()
-        raise FormatError(f"the walks are those of {len(people)} people: choose one of the walks 0 to {last}")
+        one, other, *_ = sorted(columns["walk"][chosen][first].tolist())
+        raise FormatError(
+            f"walks {one} and {other} are of different people: {one_of}, or track one person alone "
+            "(memo track --follow)"
+        )
+    times_s = columns["time_s"][chosen]
     if (np.diff(times_s) <= 0).any():
-        last = columns["walk"].max()
-        raise FormatError(f"several people walk at the same time: choose one of the walks 0 to {last}")
+        raise FormatError(f"the times of its walks overlap: {one_of}")
     names = tuple(joint for joint in JOINTS if np.isfinite(columns[f"{joint}_x_m"][chosen]).any())
     points = (
         np.stack(
@@ -95,7 +99,9 @@ def _track(table: Path, events_table: Path, walk: int | None) -> Motion:
     angles = {name: values for name, values in angles.items() if np.isfinite(values).any()}
     walks = len(np.unique(columns["walk"]))
     notes = (
-        [f"{counted(walks, 'walk')}: between them nobody was tracked."] if walk is None and walks > 1 else []
+        [f"{counted(walks, 'walk')}: between them the person was not tracked."]
+        if walk is None and walks > 1
+        else []
     )
     kept = [
         GaitEvent(event["time_s"], event["event"], event["side"])
