@@ -316,7 +316,7 @@ mod tests {
         };
         assert!(walk(0, 1.0).is_walk() && walk(7, 1.0).is_walk());
         assert!(!walk(8, 1.0).is_walk() && !walk(14, 1.0).is_walk());
-        assert!(walk(14, 0.3).is_walk(), "it says nothing about somebody who is hidden");
+        assert!(walk(14, 0.3).is_walk(), "frames in which the person is hidden do not count");
     }
 
     #[test]
