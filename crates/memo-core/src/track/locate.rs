@@ -72,6 +72,13 @@ const CROWN_QUANTILE: f64 = 0.5;
 /// deviations.
 const REFLECTION_SD: f64 = 1.0;
 
+/// The rows of a person are at least this share of the height apart, and at most the next.
+const WHOLE_SHARE: f64 = 0.67;
+const LARGEST_SHARE: f64 = 1.5;
+/// The least share if only one of the rows is used: of somebody before a wall of the colour of the clothes, the legs may
+/// be all that changes.
+const LEGS_SHARE: f64 = 0.5;
+
 /// Row of the soles and of the crown over all sightings, pixels.
 pub fn person_rows(sightings: &[Sighting]) -> (f64, f64) {
     let rows =
@@ -152,12 +159,32 @@ fn column(sighting: &Sighting) -> f64 {
 
 /// Finds the line parallel to the image plane on which the sighted person moves.
 pub fn locate(sightings: &[Sighting], camera: &Camera, crown: &Crown) -> Result<Course, LocateError> {
+    locate_with(sightings, camera, crown, stand, WHOLE_SHARE)
+}
+
+/// The lines on which the person moves by the soles alone and by the crown alone: the changes may end above the soles or
+/// below them, or below the crown.
+pub(super) fn locate_by_each_row(sightings: &[Sighting], camera: &Camera, crown: &Crown) -> Vec<Course> {
+    let ways = [position_from_feet, position_from_head];
+    ways.into_iter().filter_map(|way| locate_with(sightings, camera, crown, way, LEGS_SHARE).ok()).collect()
+}
+
+/// A way in which the rows show where a person stands.
+type Stand = fn(&Camera, &Midpoints, f64, &PositionOptions) -> Result<FootPosition, PositionError>;
+
+fn locate_with(
+    sightings: &[Sighting],
+    camera: &Camera,
+    crown: &Crown,
+    stand: Stand,
+    least_share: f64,
+) -> Result<Course, LocateError> {
     // 1. Depth of the line from the pooled rows at the sightings' mean column.
     let (sole_row, crown_row) = person_rows(sightings);
     let midpoints = person_midpoints(sightings, camera)?;
     let options = PositionOptions { height_sd_m: crown.sd_m, ..PositionOptions::default() };
     let foot = stand(camera, &midpoints, crown.height_m, &options)?;
-    check_size(camera, &foot.point_in_world, crown.height_m, sole_row - crown_row)?;
+    check_size(camera, &foot.point_in_world, crown.height_m, sole_row - crown_row, least_share)?;
     // 2. The line is parallel to the image's x axis, on the ground.
     let right = (camera.rotation.transpose() * DVec3::X).truncate().normalize_or(DVec2::X);
     let origin = camera.position().truncate();
@@ -251,11 +278,16 @@ pub(crate) fn place(camera: &Camera, path: &Path, column_px: f64, row_px: f64) -
     path.along(eye + t * ray)
 }
 
-/// The rows must agree with the height within a factor of 1.5. They do not if the person is cut off or a unit is
-/// wrong.
-fn check_size(camera: &Camera, foot: &DVec3, height_m: f64, got_px: f64) -> Result<(), LocateError> {
+/// The rows must agree with the height. They do not if the person is cut off or a unit is wrong.
+fn check_size(
+    camera: &Camera,
+    foot: &DVec3,
+    height_m: f64,
+    got_px: f64,
+    least_share: f64,
+) -> Result<(), LocateError> {
     let expected_px = camera.pixel_height_at(*foot, height_m).unwrap_or(0.0);
-    if (0.67..1.5).contains(&(got_px / expected_px)) {
+    if (least_share..LARGEST_SHARE).contains(&(got_px / expected_px)) {
         return Ok(());
     }
     let distance_m = (*foot - camera.position()).length();
@@ -471,7 +503,7 @@ mod tests {
         for (share, fits) in
             [(0.6, false), (0.66, false), (0.68, true), (1.0, true), (1.48, true), (1.52, false)]
         {
-            let checked = check_size(&camera, &foot, 1.7, share * (sole - crown));
+            let checked = check_size(&camera, &foot, 1.7, share * (sole - crown), WHOLE_SHARE);
             assert_eq!(checked.is_ok(), fits, "{share}");
             if let Err(LocateError::Size { height_m, distance_m, expected_px, got_px }) = checked {
                 assert!((expected_px - (sole - crown)).abs() < 0.5 && height_m == 1.7);

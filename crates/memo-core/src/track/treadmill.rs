@@ -91,8 +91,9 @@ pub(super) struct Spot<'a> {
     pub(super) camera: Camera,
     /// How the assumed camera is tilted; `None` of a given one.
     pub(super) tilt: Option<TiltEstimate>,
-    /// The course of the rectangles as of somebody who walks along the image plane.
-    pub(super) course: Course,
+    /// The courses of the rectangles as of somebody who walks along the image plane: by both rows, if they fit a person, and
+    /// by each row alone.
+    pub(super) courses: Vec<Course>,
     pub(super) height: BodyHeight,
     pub(super) walker: Walker,
     pub(super) backdrop: &'a Backdrop,
@@ -103,12 +104,13 @@ impl Spot<'_> {
     /// Starts a walk on the spot; `None` if the thing moves on, or if its legs do not walk.
     pub(super) fn begin(&self, standing: Standing) -> Result<Active, Standing> {
         let is_forced = self.options.treadmill == Some(true);
-        if self.course.speed_mps >= SLOWEST_MPS && !is_forced {
+        let moves_on = |course: &Course| course.speed_mps >= SLOWEST_MPS;
+        if self.courses.first().is_none_or(moves_on) && !is_forced {
             return Err(standing);
         }
         let frames: Vec<&FrameEdges> = standing.kept.iter().map(|(_, edges)| edges).step_by(EVERY).collect();
-        let Some(start) = self.start(&frames) else { return Err(standing) };
-        let Self { camera, tilt, course, height, walker, options, .. } = self;
+        let Some((course, start)) = self.start(&frames) else { return Err(standing) };
+        let Self { camera, tilt, height, walker, options, .. } = self;
         let walk = Walk::new(walker.clone(), start.path, start.beginning);
         let walk = walk.through(standing.kept.iter().map(|(_, edges)| edges), camera, &options.walk);
         Ok(Active {
@@ -124,61 +126,80 @@ impl Spot<'_> {
         })
     }
 
-    /// The heading of the fan that is most similar, and the start of a walk in it.
-    fn start(&self, frames: &[&FrameEdges]) -> Option<StartReport> {
+    /// The start of a walk where the model is most similar.
+    ///
+    /// 1. The heading of the fan at the first course.
+    /// 2. The most similar course in this heading.
+    /// 3. The fan again, if that is another place.
+    fn start(&self, frames: &[&FrameEdges]) -> Option<(&Course, StartReport)> {
         let mut options = self.options.walk;
         options.similarity.part_weights[ARMS].fill(0.0);
-        let place = self.place();
-        let heading_rad =
-            best_heading(frames, place, &self.walker, &self.camera, &self.options.cadence, &options)?;
-        let path = Path { origin: place, heading_rad };
-        let course = Course { path, along_m: vec![0.0; frames.len()], ..self.course.clone() };
-        let start = start(frames, &course, &self.walker, &self.camera, &self.options.cadence, &options)?;
+        let (walker, camera, cadence) = (&self.walker, &self.camera, &self.options.cadence);
+        let fan = Fan { frames, walker, camera, cadence, options: &options };
+        let (first, others) = self.courses.split_first()?;
+        let (heading_rad, similarity) = fan.best(place(first))?;
+        let similar = |course| {
+            let path = Path { origin: place(course), heading_rad };
+            fan.similarity(&path).map(|similarity| (course, similarity))
+        };
+        let higher = |best: (_, f64), next: (_, f64)| if next.1 > best.1 { next } else { best };
+        let (course, _) = others.iter().filter_map(similar).fold((first, similarity), higher);
+        let is_first = std::ptr::eq(course, first);
+        let heading_rad = if is_first { heading_rad } else { fan.best(place(course))?.0 };
+        let path = Path { origin: place(course), heading_rad };
+        let headed = Course { path, along_m: vec![0.0; frames.len()], ..course.clone() };
+        let start = start(frames, &headed, walker, camera, cadence, &options)?;
         let walks =
             start.contrast() >= TREADMILL_CONTRAST && start.frozen.similarity < start.lines.best.similarity;
-        (walks && start.direction == Direction::Forward).then_some(start)
-    }
-
-    /// Where the thing stays, on the ground.
-    fn place(&self) -> DVec2 {
-        let Course { path, along_m, .. } = &self.course;
-        path.point(along_m.iter().sum::<f64>() / along_m.len() as f64, 0.0).truncate()
+        (walks && start.direction == Direction::Forward).then_some((course, start))
     }
 }
 
-/// The heading at which the similarity along the best line of phase is the highest.
-fn best_heading(
-    frames: &[&FrameEdges],
-    place: DVec2,
-    walker: &Walker,
-    camera: &Camera,
-    rates: &CadenceRange,
-    options: &WalkOptions,
-) -> Option<f64> {
-    let height_m = walker.level_torso_height_m();
-    let similarity = |heading_rad: f64| {
-        let path = Path { origin: place, heading_rad };
-        let scene = Scene::new(walker, camera, &path);
-        let grid = Grid::whole_cycle_within(0.0, height_m, REACH_M);
+/// Where a thing stays, on the ground.
+fn place(course: &Course) -> DVec2 {
+    let Course { path, along_m, .. } = course;
+    path.point(along_m.iter().sum::<f64>() / along_m.len() as f64, 0.0).truncate()
+}
+
+/// Compares the model with frames in a fan of headings.
+struct Fan<'a> {
+    frames: &'a [&'a FrameEdges],
+    walker: &'a Walker,
+    camera: &'a Camera,
+    cadence: &'a CadenceRange,
+    options: &'a WalkOptions,
+}
+
+impl Fan<'_> {
+    /// The heading that is most similar to what stays at a place, and its similarity.
+    fn best(&self, origin: DVec2) -> Option<(f64, f64)> {
+        let heading = |k: usize| {
+            let heading_rad = TAU * k as f64 / HEADINGS as f64;
+            self.similarity(&Path { origin, heading_rad }).map(|similarity| (heading_rad, similarity))
+        };
+        let fan: Vec<(f64, f64)> = (0..HEADINGS).into_par_iter().filter_map(heading).collect();
+        fan.into_iter().reduce(|best, next| if next.1 > best.1 { next } else { best })
+    }
+
+    /// The similarity along the best line of phase of somebody who stays at the origin of a path.
+    fn similarity(&self, path: &Path) -> Option<f64> {
+        let scene = Scene::new(self.walker, self.camera, path);
+        let grid = Grid::whole_cycle_within(0.0, self.walker.level_torso_height_m(), REACH_M);
+        let WalkOptions { similarity, hidden_lines, .. } = self.options;
         let curve = |frame: &&FrameEdges| {
-            let found =
-                search_each_phase(&frame.edges, &scene, &grid, &options.similarity, options.hidden_lines);
+            let found = search_each_phase(&frame.edges, &scene, &grid, similarity, *hidden_lines);
             let scores = found.curve().iter().map(|(_, score)| *score).collect();
             PhaseCurve { time_s: frame.time_s, scores }
         };
-        let curves: Vec<PhaseCurve> = frames.iter().map(curve).collect();
-        phase_lines(&curves, rates).map(|lines| (heading_rad, lines.best.similarity))
-    };
-    let fan: Vec<_> =
-        (0..HEADINGS).into_par_iter().filter_map(|k| similarity(TAU * k as f64 / HEADINGS as f64)).collect();
-    let best = fan.into_iter().reduce(|best, next| if next.1 > best.1 { next } else { best })?;
-    Some(best.0)
+        let curves: Vec<PhaseCurve> = self.frames.iter().map(curve).collect();
+        phase_lines(&curves, self.cadence).map(|lines| lines.best.similarity)
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::locate::Sighting;
-    use super::super::locate::{Crown, locate};
+    use super::super::locate::{Crown, locate, locate_by_each_row};
     use super::super::result::tests::tracked;
     use super::super::search::Hypothesis;
     use super::super::search::mirrored;
@@ -219,10 +240,12 @@ mod tests {
         let options = TrackerOptions { treadmill, fit: None, ..TrackerOptions::for_height(1.75) };
         let (walker, backdrop) = (walker(), Backdrop::default());
         let crown = Crown { height_m: walker.level_crown_height_m(), sd_m: 0.02 };
-        let course = locate(&standing.sightings(), &camera(), &crown).unwrap();
+        let (sightings, camera) = (standing.sightings(), camera());
+        let both = locate(&sightings, &camera, &crown);
+        let courses = both.into_iter().chain(locate_by_each_row(&sightings, &camera, &crown)).collect();
         let height = BodyHeight::given(1.75);
-        let (camera, backdrop, options) = (camera(), &backdrop, &options);
-        let spot = Spot { camera, tilt: None, course, height, walker, backdrop, options };
+        let (backdrop, options) = (&backdrop, &options);
+        let spot = Spot { camera, tilt: None, courses, height, walker, backdrop, options };
         spot.begin(standing).ok()
     }
 
@@ -239,6 +262,22 @@ mod tests {
         assert!((active.start.lines.best.rate_hz - 0.9).abs() < 0.05);
         assert!(found.origin.distance(PLACE) < 0.1, "{found:?}");
         assert_eq!(active.walk.twins[0].steps.len(), 12);
+    }
+
+    /// Before a wall of the colour of the shirt, changes show the legs and some arm; on a bright floor, the reflection too.
+    #[test]
+    fn a_walk_on_the_spot_begins_where_its_person_is_though_one_row_is_wrong() {
+        for (share, below_px) in [(0.0, 0), (0.25, 0), (0.35, 0), (0.45, 0), (0.0, 40)] {
+            let mut seen = standing(PI, 0.9, 0.0);
+            for sighting in seen.kept.iter_mut().filter_map(|(sighting, _)| sighting.as_mut()) {
+                let rectangle = &mut sighting.rectangle;
+                rectangle.top += (share * rectangle.height() as f64) as usize;
+                rectangle.bottom += below_px;
+            }
+            let active = begun(seen, None).unwrap();
+            let off_m = active.walk.route.at(0.0).origin.distance(PLACE);
+            assert!(off_m < 0.2, "{share}, {below_px} px: {off_m}");
+        }
     }
 
     /// Without a fit, the speed is that of the walker whose legs swing like that over ground.

@@ -2,6 +2,7 @@
 
 use super::super::approach::Approach;
 use super::super::candidate::{COMFORTABLE_MPS, Given, course, feet_cut_off};
+use super::super::locate::{Crown, locate_by_each_row};
 use super::super::options::{approaching_height, start_height};
 use super::super::treadmill::Spot;
 use super::*;
@@ -110,8 +111,18 @@ impl Tracker {
         let height = start_height(options, height_m, camera, sightings);
         let walker = options.walker(height.height_m, COMFORTABLE_MPS).ok()?;
         let given = Given { options, camera, tilt: self.tilt, scale_sd: 0.0, height_m, size };
-        let (camera, course) = course(sightings, &given, walker.level_crown_height_m(), &height).ok()?;
-        Some(Spot { camera, tilt: self.tilt, course, height, walker, backdrop: &self.backdrop, options })
+        let crown_m = walker.level_crown_height_m();
+        let usual = course(sightings, &given, crown_m, &height).ok();
+        // The scale of an assumed camera is that of both rows.
+        let by_each_row = camera.map_or_else(Vec::new, |camera| {
+            let crown = Crown { height_m: crown_m, sd_m: height.sd_in_camera_m() };
+            locate_by_each_row(sightings, camera, &crown)
+        });
+        let assumed = usual.as_ref().map(|(assumed, _)| assumed);
+        let camera = camera.or(assumed)?.clone();
+        let courses = usual.into_iter().map(|(_, course)| course).chain(by_each_row).collect();
+        let (tilt, backdrop) = (self.tilt, &self.backdrop);
+        Some(Spot { camera, tilt, courses, height, walker, backdrop, options })
     }
 
     /// A walk that was taken for a slow one but stays where it is begins again on the spot.

@@ -93,7 +93,9 @@ impl Problem<'_> {
         let times_s: Vec<f64> = self.frames.iter().map(|f| f.time_s).collect();
         let phases: Vec<f64> = all.iter().map(|f| f.phase).collect();
         let ahead: Vec<DVec2> = all.iter().map(|f| DVec2::from_angle(f.heading_rad)).collect();
-        let belt = self.is_on_treadmill.then(|| belt::belt(&times_s, &phases, &feet, ahead[0])).flatten();
+        let sight = self.origin - self.camera.position().truncate();
+        let belt = || belt::belt(&times_s, &phases, &feet, ahead[0], sight);
+        let belt = self.is_on_treadmill.then(belt).flatten();
         if let Some(belt) = belt {
             belt::move_with(&mut feet, &times_s, ahead[0] * belt.speed_mps);
         }
