@@ -8,7 +8,7 @@ use super::fit::views::{Backdrop, Piece};
 use super::fit::{FitError, WalkFit};
 use super::frontal::Frontal;
 use super::height::{BodyHeight, HeightSource};
-use super::locate::{Crown, Sighting};
+use super::locate::{Crown, Rows, Sighting};
 use super::options::TrackerOptions;
 use super::people::{Now, Sign};
 use super::search::Scene;
@@ -65,6 +65,8 @@ pub(super) struct Active {
     pub(super) before: Vec<Arc<Seen>>,
     /// What the feet show of somebody who walks towards the camera or away from it.
     pub(super) frontal: Option<Frontal>,
+    /// The rows of the rectangles that show where the person is.
+    pub(super) rows: Rows,
 }
 
 impl Active {
@@ -91,6 +93,7 @@ impl Active {
             earlier: Standing::default(),
             before: Vec::new(),
             frontal: None,
+            rows: Rows::Both,
         }
     }
 

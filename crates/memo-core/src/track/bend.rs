@@ -1,6 +1,7 @@
 //! People who turn: the route through the rectangles, and the choice between it and the route so far.
 //!
-//! 1. The rectangles are smoothed to a curve on the ground ([`Trail`]).
+//! 1. The rectangles are smoothed to a curve on the ground ([`Trail`]), by both rows and, before a given camera, by the soles'
+//!    alone; the one with the more similar contours is looked at.
 //! 2. The curve is taken instead of the route so far if the contours of the latest frames are more similar on it.
 //! 3. Along the line of sight, contours tell less. Rectangles turn clearly if a curve explains them better than a straight
 //!    path on which the person may slow down, stop or set off. Then the curve is taken of somebody followed by the feet if the
@@ -12,7 +13,7 @@
 use super::active::Active;
 use super::decisions::{CLEAR_TURN, EARLY_TURN_GAIN, QUICK_TURN_GAIN, TURN_GAIN};
 use super::frontal::Frontal;
-use super::locate::Sighting;
+use super::locate::{Rows, Sighting};
 use super::options::TrackerOptions;
 use super::route::Route;
 use super::search::{Axis, Grid, Hypothesis, PHASE_STEP, POSITION_STEP_M, Scene, search_peak};
@@ -61,7 +62,7 @@ impl Active {
     fn rectangles_turn(&self, from: usize) -> bool {
         let sightings: Vec<Sighting> =
             self.kept[from..].iter().filter_map(|(sighting, _)| *sighting).collect();
-        Trail::new(&[], &sightings, &self.camera, &self.crown()).turn_gain() > CLEAR_TURN
+        Trail::new(self.rows, &[], &sightings, &self.camera, &self.crown()).turn_gain() > CLEAR_TURN
     }
 
     /// Looks for a turn when the walk seems to be over, also around a corner; true if it goes on around one.
@@ -119,7 +120,7 @@ impl Active {
         if sightings.len() < options.start_frames.min(options.path_frames) {
             return false;
         }
-        // 1. The curve, joined to the route so far.
+        // 1. The curve, joined to the route so far, by the rows with which the contours are more similar.
         let before = self.frames_before(first_s);
         let anchored = &self.steps()[before.saturating_sub(ANCHORS)..];
         let Some(along_m) = anchored.first().map(|step| step.state.along.position) else { return false };
@@ -128,17 +129,34 @@ impl Active {
             .iter()
             .map(|step| Anchor { time_s: step.time_s, place_m: route.place(step.state.along.position) })
             .collect();
-        let trail = Trail::new(&anchors, &sightings, &self.camera, &self.crown());
-        let Some(curved) = route.continued(&trail.curve(jerk_sd), along_m) else { return false };
-        let turn_gain = trail.turn_gain();
-        let is_clear = turn_gain > CLEAR_TURN;
-        // 2. A quick look whether it can be better.
         let frames = || self.steps()[before..].iter().zip(&kept).step_by(QUICK_EVERY);
         let quick = |new: &Route| -> f64 {
             frames().map(|(step, (_, edges))| self.similarity_on(new, step, edges, options)).sum()
         };
+        let by = |rows: &Rows| {
+            let trail = Trail::new(*rows, &anchors, &sightings, &self.camera, &self.crown());
+            let curved = route.continued(&trail.curve(jerk_sd), along_m)?;
+            let similarity = quick(&curved);
+            // Other rows also show another distance, which is no turn.
+            let is_turn = *rows == self.rows || {
+                let straight = route.continued(&trail.straight(), along_m);
+                straight.is_none_or(|straight| similarity > (1.0 + QUICK_TURN_GAIN) * quick(&straight))
+            };
+            is_turn.then_some((*rows, trail, curved, similarity))
+        };
+        let ways = if options.camera.is_some() { &[Rows::Both, Rows::Soles][..] } else { &[Rows::Both] };
+        // Both rows together are more accurate where none is wrong.
+        let least_gain = if when == When::Ended { TURN_GAIN } else { 0.0 };
+        let better = |best: (_, _, _, f64), next: (_, _, _, f64)| {
+            if next.3 > (1.0 + least_gain) * best.3 { next } else { best }
+        };
+        let best = ways.iter().filter_map(by).reduce(better);
+        let Some((rows, trail, curved, similarity)) = best else { return false };
+        let turn_gain = trail.turn_gain();
+        let is_clear = turn_gain > CLEAR_TURN;
+        // 2. A quick look whether it can be better.
         let is_quick = when == When::Regularly && !(is_clear && self.is_frontal());
-        if is_quick && quick(&curved) < (1.0 + QUICK_TURN_GAIN) * quick(route) {
+        if is_quick && similarity < (1.0 + QUICK_TURN_GAIN) * quick(route) {
             return false;
         }
         // 3. The frames on the curve.
@@ -156,7 +174,7 @@ impl Active {
             When::Regularly | When::BesideOthers => is_more_similar,
         };
         if is_better {
-            (self.walk, self.frontal) = (walk, frontal);
+            (self.walk, self.frontal, self.rows) = (walk, frontal, rows);
         }
         is_better
     }
@@ -223,6 +241,7 @@ impl Active {
 #[cfg(test)]
 mod tests {
     use super::super::active::tests::{BEGINNING, PATH, active, frames_on, options};
+    use super::super::search::tests::camera;
     use super::super::trail::tests::{FRAME_S, arc};
     use super::*;
 
@@ -258,6 +277,33 @@ mod tests {
         // The sums are those of the steps that are left.
         let sum: f64 = turning.walk.twins[0].steps.iter().map(|s| f64::from(s.similarity * s.visible)).sum();
         assert!((sum - turning.walk.twins[0].similarity_sum).abs() < 1e-9);
+    }
+
+    /// The head and the shirt of somebody have the colour of the wall, more and less of them as the wall changes.
+    fn without_crown(mut active: Active) -> Active {
+        for (k, (sighting, _)) in active.kept.iter_mut().enumerate() {
+            let rectangle = &mut sighting.as_mut().expect("a rectangle in each frame").rectangle;
+            let share = 0.15 + 0.2 * (0.13 * k as f64).sin().powi(2);
+            rectangle.top += (share * rectangle.height() as f64) as usize;
+        }
+        active
+    }
+
+    #[test]
+    fn the_soles_show_the_turn_of_somebody_whose_crown_is_not_seen() {
+        let options = TrackerOptions { camera: Some(camera()), ..options() };
+        let route = arc(-2.5);
+        let mut turning = without_crown(followed(&route, &route));
+        turning.turn(&options);
+        assert!(!turning.walk.route.is_straight() && turning.rows == Rows::Soles);
+        for step in &turning.steps()[10..40] {
+            let path = turning.walk.route.at(step.state.along.position);
+            let at = route.at(BEGINNING.along_m + 1.2 * step.time_s);
+            assert!((path.heading_rad - at.heading_rad).abs() < 0.2, "{}", step.frame);
+        }
+        let mut straight = without_crown(followed(&PATH.into(), &PATH.into()));
+        straight.turn(&options);
+        assert!(straight.walk.route.is_straight());
     }
 
     #[test]

@@ -139,6 +139,13 @@ pub(super) fn is_of_one_person(camera: &Camera, rectangle: &Rectangle) -> bool {
     is_cut || height_of(camera, &sighting).is_none_or(|height_m| height_m < TALLEST_M)
 }
 
+/// True if a rectangle that stands on the ground is as tall as a person of this height.
+pub(super) fn is_as_tall(camera: &Camera, rectangle: &Rectangle, height: &BodyHeight) -> bool {
+    let sighting = Sighting { time_s: 0.0, rectangle: *rectangle };
+    let seen = |height_m| BodyHeight { height_m, sd_m: RECTANGLE_SD_M, ..*height };
+    height_of(camera, &sighting).is_some_and(|height_m| !height.contradicts(&seen(height_m)))
+}
+
 fn height_of(camera: &Camera, sighting: &Sighting) -> Option<f64> {
     let weight = PositionOptions::default().bottom_weight;
     let midpoints = person_midpoints(std::slice::from_ref(sighting), camera).ok()?;

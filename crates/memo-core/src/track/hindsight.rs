@@ -87,7 +87,7 @@ impl Active {
         };
         let anchors: Vec<Anchor> = (count - ANCHORS..count).map(anchor).collect();
         let crown = joined.crown();
-        let trail = Trail::new(&anchors, &sightings, &joined.camera, &crown);
+        let trail = Trail::new(joined.rows, &anchors, &sightings, &joined.camera, &crown);
         let points = trail.curve(CORNER_JERK_SD);
         let from_m = joined.steps()[count - ANCHORS].state.along.position;
         let route = joined.walk.route.continued(&points, from_m)?;
@@ -134,7 +134,7 @@ impl Active {
         let anchors: Vec<Anchor> = (0..ANCHORS.min(steps.len())).rev().map(anchor).collect();
         let backwards: Vec<Sighting> =
             earlier.sightings().iter().rev().map(|s| Sighting { time_s: -s.time_s, ..*s }).collect();
-        let trail = Trail::new(&anchors, &backwards, &self.camera, &self.crown());
+        let trail = Trail::new(self.rows, &anchors, &backwards, &self.camera, &self.crown());
         let mut way: Vec<DVec2> = trail.curve(JERK_SD)[anchors.len()..].iter().rev().copied().collect();
         let times_s: Vec<f64> = trail.times_s()[anchors.len()..].iter().rev().map(|time_s| -time_s).collect();
         if times_s.len() < 2 {

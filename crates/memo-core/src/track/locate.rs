@@ -157,33 +157,59 @@ fn column(sighting: &Sighting) -> f64 {
     0.5 * (sighting.rectangle.left + sighting.rectangle.right) as f64
 }
 
+/// Which row of a rectangle shows how far away a person is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Rows {
+    /// Both, but the soles' not where it is that of a reflection or a shadow ([`stand`]).
+    Both,
+    /// The soles' alone: the changes may end below the crown.
+    Soles,
+    /// The crown's alone: the changes may end above the soles or below them.
+    Crown,
+}
+
+impl Rows {
+    fn stand(
+        self,
+        camera: &Camera,
+        midpoints: &Midpoints,
+        crown: &Crown,
+    ) -> Result<FootPosition, PositionError> {
+        let options = PositionOptions { height_sd_m: crown.sd_m, ..PositionOptions::default() };
+        let way = match self {
+            Self::Both => stand,
+            Self::Soles => position_from_feet,
+            Self::Crown => position_from_head,
+        };
+        way(camera, midpoints, crown.height_m, &options)
+    }
+
+    /// The share of the height that the rectangle shows at least.
+    fn least_share(self) -> f64 {
+        match self {
+            Self::Both => WHOLE_SHARE,
+            Self::Soles | Self::Crown => LEGS_SHARE,
+        }
+    }
+}
+
 /// Finds the line parallel to the image plane on which the sighted person moves.
 pub fn locate(sightings: &[Sighting], camera: &Camera, crown: &Crown) -> Result<Course, LocateError> {
-    locate_with(sightings, camera, crown, stand, WHOLE_SHARE)
+    locate_by(Rows::Both, sightings, camera, crown)
 }
 
-/// The lines on which the person moves by the soles alone and by the crown alone: the changes may end above the soles or
-/// below them, or below the crown.
-pub(super) fn locate_by_each_row(sightings: &[Sighting], camera: &Camera, crown: &Crown) -> Vec<Course> {
-    let ways = [position_from_feet, position_from_head];
-    ways.into_iter().filter_map(|way| locate_with(sightings, camera, crown, way, LEGS_SHARE).ok()).collect()
-}
-
-/// A way in which the rows show where a person stands.
-type Stand = fn(&Camera, &Midpoints, f64, &PositionOptions) -> Result<FootPosition, PositionError>;
-
-fn locate_with(
+/// The same by some of the rows.
+pub(super) fn locate_by(
+    rows: Rows,
     sightings: &[Sighting],
     camera: &Camera,
     crown: &Crown,
-    stand: Stand,
-    least_share: f64,
 ) -> Result<Course, LocateError> {
     // 1. Depth of the line from the pooled rows at the sightings' mean column.
     let (sole_row, crown_row) = person_rows(sightings);
     let midpoints = person_midpoints(sightings, camera)?;
-    let options = PositionOptions { height_sd_m: crown.sd_m, ..PositionOptions::default() };
-    let foot = stand(camera, &midpoints, crown.height_m, &options)?;
+    let foot = rows.stand(camera, &midpoints, crown)?;
+    let least_share = rows.least_share();
     check_size(camera, &foot.point_in_world, crown.height_m, sole_row - crown_row, least_share)?;
     // 2. The line is parallel to the image's x axis, on the ground.
     let right = (camera.rotation.transpose() * DVec3::X).truncate().normalize_or(DVec2::X);
@@ -240,11 +266,15 @@ pub fn locate_slanting(sightings: &[Sighting], camera: &Camera, crown: &Crown) -
     })
 }
 
-/// Where the person of one rectangle stands.
-pub(super) fn foot(sighting: &Sighting, camera: &Camera, crown: &Crown) -> Result<FootPosition, LocateError> {
+/// Where the person of one rectangle stands, by some of its rows.
+pub(super) fn foot(
+    rows: Rows,
+    sighting: &Sighting,
+    camera: &Camera,
+    crown: &Crown,
+) -> Result<FootPosition, LocateError> {
     let midpoints = person_midpoints(std::slice::from_ref(sighting), camera)?;
-    let options = PositionOptions { height_sd_m: crown.sd_m, ..PositionOptions::default() };
-    Ok(stand(camera, &midpoints, crown.height_m, &options)?)
+    Ok(rows.stand(camera, &midpoints, crown)?)
 }
 
 /// The position from both rows, weighted. If the depth from the soles is much smaller than that from the crown,

@@ -35,7 +35,7 @@ use super::decisions::{OUTSIDE_SHARE, SAME_BODY, SAME_PLACE_M};
 use super::evidence::{Evidence, EvidenceError, EvidenceOptions, EvidenceStream};
 use super::fit::views::{Backdrop, Piece};
 use super::fit::{FitError, WalkFit};
-use super::height::{is_of_a_person, is_of_one_person};
+use super::height::{is_as_tall, is_of_a_person, is_of_one_person};
 use super::left_out::{Hindrance, LeftOut, Reason, Unfollowed};
 use super::locate::{Sighting, same_person};
 use super::options::TrackerOptions;
@@ -477,7 +477,9 @@ impl Tracker {
             edges.others.clone_from(&others);
             // 3. A rectangle that nobody else is in.
             let overlaps = |region: &&Rectangle| region.gap(&own.window) == [0, 0];
-            let region = if meeting.is_empty() { regions.iter().find(overlaps) } else { None };
+            let is_alone = meeting.iter().all(|&other| self.is_unproven(other));
+            let region = if is_alone { regions.iter().find(overlaps) } else { None };
+            let region = region.filter(|region| meeting.is_empty() || self.is_of(k, region, own));
             let sighting = region.and_then(|region| whole(region, evidence));
             let active = &mut self.people[k];
             active.walk.follow(&edges, &active.camera, &self.options.walk);
@@ -496,6 +498,20 @@ impl Tracker {
             self.people[k].turn(&self.options);
         }
         Ok(())
+    }
+
+    /// True for somebody who was started beside another person and may be a part of that person.
+    fn is_unproven(&self, k: usize) -> bool {
+        self.people[k].started_near && !self.people[k].settled
+    }
+
+    /// True if a region shows one trunk, is as tall as somebody who is followed, and does not reach beyond where that person is
+    /// expected.
+    fn is_of(&self, k: usize, region: &Rectangle, expected: &Expected) -> bool {
+        let Active { camera, height, .. } = &self.people[k];
+        let has_trunks = self.side_by_side.iter().any(|(other, _)| other == region);
+        let is_within = expected.window.union(region) == expected.window;
+        is_within && !has_trunks && is_as_tall(camera, region, height)
     }
 
     /// Settles path and person of somebody who was followed for long enough.

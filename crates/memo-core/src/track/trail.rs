@@ -3,7 +3,7 @@
 //! Each rectangle is a point on the ground, by the rows of feet and crown. The points are smoothed to a curve of slowly
 //! changing acceleration. Of somebody who goes straight, a straight path explains them as well, at whatever speed.
 
-use super::locate::{Crown, Sighting, foot};
+use super::locate::{Crown, Rows, Sighting, foot};
 use crate::estimate::arrow::{Arrow, velocity_change};
 use crate::estimate::smooth::Measured;
 use crate::model::Camera;
@@ -40,8 +40,15 @@ pub(super) struct Trail {
 }
 
 impl Trail {
-    /// From the anchors through the sightings, all in order of time. Sightings that show no place are left out.
-    pub fn new(anchors: &[Anchor], sightings: &[Sighting], camera: &Camera, crown: &Crown) -> Self {
+    /// From the anchors through the sightings by some of their rows, all in order of time. Sightings that show no place are
+    /// left out.
+    pub fn new(
+        rows: Rows,
+        anchors: &[Anchor],
+        sightings: &[Sighting],
+        camera: &Camera,
+        crown: &Crown,
+    ) -> Self {
         let sight = (camera.rotation.transpose() * DVec3::Z).truncate().normalize_or(DVec2::Y);
         let axes = [sight, sight.perp()];
         let mut times_s: Vec<f64> = anchors.iter().map(|anchor| anchor.time_s).collect();
@@ -50,7 +57,7 @@ impl Trail {
         };
         let mut places = axes.map(|axis| anchored(axis).collect::<Vec<_>>());
         for sighting in sightings {
-            let Ok(foot) = foot(sighting, camera, crown) else { continue };
+            let Ok(foot) = foot(rows, sighting, camera, crown) else { continue };
             times_s.push(sighting.time_s);
             for (axis, places) in axes.iter().zip(&mut places) {
                 let value = axis.dot(foot.point_in_world.truncate());
@@ -69,8 +76,16 @@ impl Trail {
     /// Points on the ground along a smooth curve, one for each place.
     pub fn curve(&self, jerk_sd: f64) -> Vec<DVec2> {
         let smoothed = |places: &Vec<Measured>| smoothed(&self.times_s, places, jerk_sd);
-        let [along, across] = self.places.each_ref().map(smoothed);
-        let points = along.iter().zip(&across);
+        self.points(&self.places.each_ref().map(smoothed))
+    }
+
+    /// The same along the most likely straight path.
+    pub fn straight(&self) -> Vec<DVec2> {
+        self.points(&self.on_a_line())
+    }
+
+    fn points(&self, [along, across]: &[Vec<f64>; 2]) -> Vec<DVec2> {
+        let points = along.iter().zip(across);
         points.map(|(along, across)| along * self.axes[0] + across * self.axes[1]).collect()
     }
 
@@ -199,7 +214,7 @@ pub(super) mod tests {
             let route = arc(radius_m);
             let frames = frames_on(50, FRAME_S, &route, &route);
             let sightings: Vec<Sighting> = frames.iter().filter_map(|(sighting, _)| *sighting).collect();
-            let points = Trail::new(&[], &sightings, &camera(), &crown).curve(JERK_SD);
+            let points = Trail::new(Rows::Both, &[], &sightings, &camera(), &crown).curve(JERK_SD);
             assert_eq!(points.len(), 50);
             for (k, point) in points.iter().enumerate() {
                 let truth = route.place(BEGINNING.along_m + 1.2 * FRAME_S * k as f64);
@@ -235,7 +250,7 @@ pub(super) mod tests {
             place_m: route.place(BEGINNING.along_m + 1.2 * FRAME_S * k as f64) + 0.5 * DVec2::Y,
         };
         let anchors: Vec<Anchor> = (0..10).map(anchor).collect();
-        let points = Trail::new(&anchors, &sightings, &camera(), &crown).curve(JERK_SD);
+        let points = Trail::new(Rows::Both, &anchors, &sightings, &camera(), &crown).curve(JERK_SD);
         assert!(points[5].distance(anchors[5].place_m) < 0.05);
         assert!(points[39].y < 0.25, "{}", points[39]);
     }
@@ -249,7 +264,7 @@ pub(super) mod tests {
                 .iter()
                 .filter_map(|(sighting, _)| *sighting)
                 .collect();
-            Trail::new(&[], &sightings, &camera(), &crown).turn_gain()
+            Trail::new(Rows::Both, &[], &sightings, &camera(), &crown).turn_gain()
         };
         assert!(gain(1e6, FRAME_S, 50) < 0.5 * CLEAR_TURN, "{}", gain(1e6, FRAME_S, 50));
         for radius_m in [1.5, -1.5] {
@@ -295,7 +310,7 @@ pub(super) mod tests {
     fn a_point_costs_half_the_square_of_its_distance_in_standard_deviations() {
         let anchor = |k: i32| Anchor { time_s: f64::from(k), place_m: DVec2::new(f64::from(k), 1.0) };
         let crown = Crown { height_m: 1.7, sd_m: 0.02 };
-        let trail = Trail::new(&[anchor(0), anchor(1)], &[], &camera(), &crown);
+        let trail = Trail::new(Rows::Both, &[anchor(0), anchor(1)], &[], &camera(), &crown);
         let off = DVec2::new(2.0 * ANCHOR_SD_M, -ANCHOR_SD_M);
         assert!((trail.cost(1.0, anchor(1).place_m + off) - 2.5).abs() < 1e-9);
         assert!(trail.cost(0.0, anchor(0).place_m) < 1e-12 && trail.cost(0.5, DVec2::ZERO) == 0.0);

@@ -199,7 +199,7 @@ impl Fan<'_> {
 #[cfg(test)]
 mod tests {
     use super::super::locate::Sighting;
-    use super::super::locate::{Crown, locate, locate_by_each_row};
+    use super::super::locate::{Crown, Rows, locate_by};
     use super::super::result::tests::tracked;
     use super::super::search::Hypothesis;
     use super::super::search::mirrored;
@@ -241,8 +241,8 @@ mod tests {
         let (walker, backdrop) = (walker(), Backdrop::default());
         let crown = Crown { height_m: walker.level_crown_height_m(), sd_m: 0.02 };
         let (sightings, camera) = (standing.sightings(), camera());
-        let both = locate(&sightings, &camera, &crown);
-        let courses = both.into_iter().chain(locate_by_each_row(&sightings, &camera, &crown)).collect();
+        let ways = [Rows::Both, Rows::Soles, Rows::Crown].into_iter();
+        let courses = ways.filter_map(|rows| locate_by(rows, &sightings, &camera, &crown).ok()).collect();
         let height = BodyHeight::given(1.75);
         let (backdrop, options) = (&backdrop, &options);
         let spot = Spot { camera, tilt: None, courses, height, walker, backdrop, options };

@@ -2,7 +2,7 @@
 
 use super::super::approach::Approach;
 use super::super::candidate::{COMFORTABLE_MPS, Given, course, feet_cut_off};
-use super::super::locate::{Crown, locate_by_each_row};
+use super::super::locate::{Crown, Rows, locate_by};
 use super::super::options::{approaching_height, start_height};
 use super::super::treadmill::Spot;
 use super::*;
@@ -116,7 +116,8 @@ impl Tracker {
         // The scale of an assumed camera is that of both rows.
         let by_each_row = camera.map_or_else(Vec::new, |camera| {
             let crown = Crown { height_m: crown_m, sd_m: height.sd_in_camera_m() };
-            locate_by_each_row(sightings, camera, &crown)
+            let ways = [Rows::Soles, Rows::Crown].into_iter();
+            ways.filter_map(|rows| locate_by(rows, sightings, camera, &crown).ok()).collect()
         });
         let assumed = usual.as_ref().map(|(assumed, _)| assumed);
         let camera = camera.or(assumed)?.clone();
