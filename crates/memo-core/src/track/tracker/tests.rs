@@ -487,6 +487,32 @@ fn who_stands_in_front_hides_who_is_behind() {
     assert!((0.02..0.4).contains(&visible[1]), "{visible:?}");
 }
 
+/// Whether the two are given a moving region as their rectangle, the second one started `near` the first and `settled`.
+fn given_region(region: Rectangle, near: bool, settled: bool) -> [bool; 2] {
+    let mut tracker = following_two(0.8);
+    let second = tracker.people.remove(1);
+    tracker.people.push(Active { started_near: near, settled, ..second });
+    tracker.advance(&evidence(40, &[region])).unwrap();
+    [0, 1].map(|person| {
+        let active = tracker.people.iter().find(|active| active.person == person).unwrap();
+        active.kept.last().is_some_and(|(sighting, _)| sighting.is_some())
+    })
+}
+
+/// What was left over from somebody who turned may start a walk within the region of that person.
+#[test]
+fn a_region_of_one_person_stays_that_person_s_while_somebody_else_only_just_started_in_it() {
+    let own = rectangle_of(&walker(), &camera(), &PATH, 0.05);
+    assert_eq!(given_region(own, true, false), [true, false]);
+    assert_eq!(given_region(own, true, true), [false, false], "of either");
+    assert_eq!(given_region(own, false, false), [false, false], "both came on their own");
+    let wide = Rectangle { right: own.right + 60, ..own };
+    let low = Rectangle { top: own.top + own.height() / 4, ..own };
+    for others in [wide, low] {
+        assert_eq!(given_region(others, true, false), [false, false], "{others:?}");
+    }
+}
+
 #[test]
 fn everybody_is_told_in_order_of_appearance() {
     let mut tracker = following_two(0.8);
