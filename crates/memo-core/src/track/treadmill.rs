@@ -129,7 +129,7 @@ impl Spot<'_> {
     /// The start of a walk where the model is most similar.
     ///
     /// 1. The heading of the fan at the first course.
-    /// 2. The most similar course in this heading.
+    /// 2. The most similar course in this heading, of those that contradict the first one.
     /// 3. The fan again, if that is another place.
     fn start(&self, frames: &[&FrameEdges]) -> Option<(&Course, StartReport)> {
         let mut options = self.options.walk;
@@ -143,7 +143,10 @@ impl Spot<'_> {
             fan.similarity(&path).map(|similarity| (course, similarity))
         };
         let higher = |best: (_, f64), next: (_, f64)| if next.1 > best.1 { next } else { best };
-        let (course, _) = others.iter().filter_map(similar).fold((first, similarity), higher);
+        // Where no row is wrong, both together are more accurate.
+        let contradicts = |other: &&Course| place(other).distance(place(first)) > other.depth_sd_m;
+        let others = others.iter().filter(contradicts);
+        let (course, _) = others.filter_map(similar).fold((first, similarity), higher);
         let is_first = std::ptr::eq(course, first);
         let heading_rad = if is_first { heading_rad } else { fan.best(place(course))?.0 };
         let path = Path { origin: place(course), heading_rad };
