@@ -1,11 +1,16 @@
 //! The tracker on somebody who walks on the spot, while nobody else is followed.
 
+use super::super::active::Active;
 use super::super::approach::Approach;
 use super::super::candidate::{COMFORTABLE_MPS, Given, course, feet_cut_off};
+use super::super::evidence::Evidence;
+use super::super::fit::views::Piece;
+use super::super::locate::Sighting;
 use super::super::locate::{Crown, Rows, locate_by};
 use super::super::options::{approaching_height, start_height};
+use super::super::standing::Standing;
 use super::super::treadmill::Spot;
-use super::*;
+use super::{TrackError, Tracker, WINDOW_MARGIN_PX, feet, grown};
 
 /// A start looks at so many seconds at most.
 const LONGEST_S: f64 = 4.0;

@@ -2,7 +2,9 @@
 
 use super::super::active::tests::active;
 use super::super::candidate::tests::seen_walking;
+use super::super::crowd::{body_box, clear_explained};
 use super::super::height::BodyHeight;
+use super::super::people::Sign;
 use super::super::search::tests::{camera, rectangle_of, walker};
 use super::super::search::{Hypothesis, Path, Scene};
 use super::super::start::Direction;
@@ -17,6 +19,7 @@ use crate::image::{BackgroundOptions, CleanOptions, Image};
 use crate::model::body::PART_COUNT;
 use crate::track::fit::FitOptions;
 use crate::track::steady::LossReason;
+use glam::DVec2;
 
 const SIZE: [usize; 2] = [640, 480];
 

@@ -1,8 +1,13 @@
 //! What the tracker notes of those who move and are not followed.
 
-use super::super::left_out::{Noticed, SMALLEST_PX, Shot, WalkBoxes};
-use super::*;
-use crate::image::Region;
+use super::super::active::Active;
+use super::super::crowd::body_box;
+use super::super::evidence::Evidence;
+use super::super::left_out::{Hindrance, Noticed, Reason, SMALLEST_PX, Shot, WalkBoxes};
+use super::super::walk::Step;
+use super::{Tracker, whole};
+use crate::image::{GroupOptions, Rectangle, Region, Sides};
+use crate::model::{Camera, EllipticCylinder};
 
 /// Regions that move, those of the size of a person and smaller ones, the largest first.
 #[derive(Debug, Default)]
@@ -32,7 +37,7 @@ pub(super) fn with_small_ones(group: &GroupOptions) -> GroupOptions {
 
 /// Where somebody was in the frames of a walk.
 pub(super) fn walk_boxes(active: &Active) -> Option<WalkBoxes> {
-    let shot = |step: &super::super::walk::Step| {
+    let shot = |step: &Step| {
         let hypothesis = step.state.hypothesis();
         let body = active.scene(hypothesis.along_m).pose(&hypothesis).cylinders;
         let rectangle = body_rectangle(&active.camera, &body)?;

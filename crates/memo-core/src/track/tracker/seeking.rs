@@ -1,0 +1,170 @@
+//! Step 1 of the tracker: the regions that nobody explains who is followed, and the candidates that they are added to.
+
+use super::super::candidate::{Candidate, MISSED_FRAMES, Seen};
+use super::super::crowd::{body_box, clear_explained, keep_unowned};
+use super::super::evidence::Evidence;
+use super::super::fit::views::Piece;
+use super::super::height::{is_of_a_person, is_of_one_person};
+use super::super::left_out::Hindrance;
+use super::super::locate::{Sighting, same_person};
+use super::unfollowed::{Moving, with_small_ones};
+use super::{TrackError, Tracker, WINDOW_MARGIN_PX, grown, whole};
+use crate::image::{GroupOptions, Mask, Rectangle, Region, group_regions_of, regions, side_by_side};
+use std::sync::Arc;
+
+/// At most this many regions are looked at in a frame, the largest: they bound its time.
+const MOST_CANDIDATES: usize = 8;
+/// People are sought apart after they have been side by side in so many frames in a row.
+const APART_FRAMES: usize = 4;
+/// A box belongs to somebody who is followed if it overlaps the body's box by this, intersection over union.
+const OWN_BOX: f64 = 0.3;
+
+impl Tracker {
+    /// Adds the regions that nobody explains to the candidates, and starts those that walk.
+    pub(super) fn seek(
+        &mut self,
+        evidence: &Evidence,
+        moving: Moving,
+        are_given: bool,
+    ) -> Result<(), TrackError> {
+        let regions = &moving.regions;
+        self.report.frames_with_candidate += usize::from(!regions.is_empty());
+        let is_cut_off = regions.first().is_some_and(|region| whole(region, evidence).is_none());
+        self.report.frames_cut_off += usize::from(is_cut_off);
+        if self.people.is_empty() {
+            self.stand(evidence, regions.first().and_then(|region| whole(region, evidence)))?;
+        }
+        let moving = match are_given {
+            _ if self.people.is_empty() => moving,
+            true => Moving::of_size(self.unclaimed(moving.regions)),
+            false => self.unexplained(evidence),
+        };
+        self.candidates.iter_mut().for_each(|candidate| candidate.missed += 1);
+        let camera = if self.people.is_empty() { None } else { self.camera() };
+        let can_be = |sighting: &Sighting| camera.is_none_or(|camera| is_of_a_person(camera, sighting));
+        let most = if are_given { usize::MAX } else { MOST_CANDIDATES };
+        let mut sightings: Vec<Sighting> = Vec::new();
+        let mut hinder = |region: &Rectangle| {
+            let Some(sighting) = whole(region, evidence) else { return Some(Hindrance::CutOff) };
+            if !can_be(&sighting) {
+                return Some(Hindrance::WrongSize);
+            }
+            if sightings.len() == most {
+                return Some(Hindrance::Crowded);
+            }
+            sightings.push(sighting);
+            None
+        };
+        let hindrances: Vec<Option<Hindrance>> = moving.regions.iter().map(&mut hinder).collect();
+        self.notice(evidence, &moving, &hindrances);
+        let first = evidence.frame.saturating_sub(self.options.path_frames);
+        self.sought.retain(|seen| seen.edges.frame >= first);
+        for sighting in sightings {
+            let seen = self.seen(evidence, sighting)?;
+            self.sought.push(Arc::new(seen.clone()));
+            let rectangle = &sighting.rectangle;
+            let known = self.candidates.iter_mut().filter(|c| c.missed > 0 && c.is_at(rectangle));
+            let nearest = known.max_by(|a, b| a.overlap(rectangle).total_cmp(&b.overlap(rectangle)));
+            match nearest {
+                Some(candidate) => candidate.add(seen),
+                None => self.candidates.push(Candidate { seen: vec![seen], ..Candidate::default() }),
+            }
+        }
+        self.candidates.retain(|candidate| candidate.missed <= MISSED_FRAMES);
+        self.start(evidence);
+        self.start_on_the_spot(evidence);
+        self.settle_unfollowed();
+        Ok(())
+    }
+
+    /// Boxes that are not those of the people who are followed: each has the box that overlaps the body most.
+    pub(super) fn unclaimed(&self, mut boxes: Vec<Rectangle>) -> Vec<Rectangle> {
+        for active in &self.people {
+            let Some(body) = active.as_followed().and_then(|seen| body_box(&active.camera, &seen.body))
+            else {
+                continue;
+            };
+            let overlaps = boxes.iter().map(|r| r.sides(0.0).overlap(&body)).enumerate();
+            let own = overlaps.max_by(|a, b| a.1.total_cmp(&b.1));
+            if let Some((k, _)) = own.filter(|(_, part)| *part >= OWN_BOX) {
+                boxes.remove(k);
+            }
+        }
+        boxes
+    }
+
+    /// Regions of change that the bodies of the people do not explain.
+    fn unexplained(&self, evidence: &Evidence) -> Moving {
+        let mut mask: Mask = evidence.firm_mask.clone();
+        for active in &self.people {
+            if let Some(seen) = active.as_followed() {
+                clear_explained(&mut mask, &active.camera, &seen.body, seen.height_px);
+            }
+        }
+        let group: &GroupOptions = &self.options.evidence.group;
+        let parts = regions(&mask, group.min_part_area);
+        Moving::new(group_regions_of(&parts, &with_small_ones(group), |r| self.can_be_one(r)), group)
+    }
+
+    /// Regions divided where people have been side by side for some frames, largest first.
+    pub(super) fn apart(&mut self, regions: Vec<Region>, min_area: usize) -> Vec<Region> {
+        let before = std::mem::take(&mut self.side_by_side);
+        let mut apart = Vec::new();
+        for region in regions {
+            let parts = side_by_side(region.clone());
+            let last = before.iter().filter(|(last, _)| same_person(last, &region.rectangle));
+            let frames = 1 + last.map(|(_, frames)| *frames).max().unwrap_or(0);
+            if parts.len() > 1 {
+                self.side_by_side.push((region.rectangle, frames));
+            }
+            if parts.len() > 1 && frames >= APART_FRAMES {
+                // What was seen of them as one thing belongs to neither.
+                if frames == APART_FRAMES {
+                    self.candidates.retain(|candidate| !candidate.is_at(&region.rectangle));
+                }
+                apart.extend(parts.into_iter().filter(|part| part.area >= min_area));
+            } else {
+                apart.push(region);
+            }
+        }
+        apart.sort_by_key(|region| std::cmp::Reverse(region.area));
+        apart
+    }
+
+    /// False if a rectangle is too tall for one person who stands on the ground of a given camera.
+    pub(super) fn can_be_one(&self, rectangle: &Rectangle) -> bool {
+        self.options.camera.as_ref().is_none_or(|camera| is_of_one_person(camera, rectangle))
+    }
+
+    /// What a candidate shows in a frame, without the edges of people who are followed.
+    fn seen(&mut self, evidence: &Evidence, sighting: Sighting) -> Result<Seen, TrackError> {
+        let window = grown(&sighting.rectangle, evidence, WINDOW_MARGIN_PX);
+        let mut edges = self.edges(evidence, &window, self.camera())?;
+        for active in &self.people {
+            let Some(expected) = active.as_followed() else { continue };
+            if expected.window.gap(&window) == [0, 0] {
+                edges.shared = true;
+                keep_unowned(&mut edges.edges, &[&expected]);
+                edges.others.extend(expected.body);
+            }
+        }
+        let piece = self.options.fit.map(|_| {
+            self.backdrop.occupy(evidence.frame, sighting.rectangle);
+            let alone = (!edges.shared).then_some(&sighting);
+            Piece::new(evidence.frame, &evidence.grey, sighting.rectangle, edges.others.clone())
+                .with_crown(alone)
+        });
+        Ok(Seen { sighting, edges, piece })
+    }
+
+    /// The boxes given for a frame, the largest first; `None` if none were given.
+    pub(super) fn given_boxes(&mut self, evidence: &Evidence) -> Option<Vec<Rectangle>> {
+        let later = self.boxes.split_off(&(evidence.frame + 1));
+        let given = std::mem::replace(&mut self.boxes, later).remove(&evidence.frame)?;
+        let size = [evidence.grey.width(), evidence.grey.height()];
+        let place = |r: &Rectangle| self.stream.in_first_view(evidence.frame, r, size);
+        let mut boxes: Vec<Rectangle> = given.iter().map(place).collect();
+        boxes.sort_by_key(|r| std::cmp::Reverse(r.width() * r.height()));
+        Some(boxes)
+    }
+}
