@@ -126,29 +126,22 @@ impl Spot<'_> {
         })
     }
 
-    /// The start of a walk where the model is most similar.
-    ///
-    /// 1. The heading of the fan at the first course.
-    /// 2. The most similar course in this heading, of those that contradict the first one.
-    /// 3. The fan again, if that is another place.
+    /// The start of a walk where the model is most similar: in the best heading of a fan at the first course, and at those
+    /// that contradict it.
     fn start(&self, frames: &[&FrameEdges]) -> Option<(&Course, StartReport)> {
         let mut options = self.options.walk;
         options.similarity.part_weights[ARMS].fill(0.0);
         let (walker, camera, cadence) = (&self.walker, &self.camera, &self.options.cadence);
         let fan = Fan { frames, walker, camera, cadence, options: &options };
-        let (first, others) = self.courses.split_first()?;
-        let (heading_rad, similarity) = fan.best(place(first))?;
-        let similar = |course| {
-            let path = Path { origin: place(course), heading_rad };
-            fan.similarity(&path).map(|similarity| (course, similarity))
-        };
-        let higher = |best: (_, f64), next: (_, f64)| if next.1 > best.1 { next } else { best };
         // Where no row is wrong, both together are more accurate.
-        let contradicts = |other: &&Course| place(other).distance(place(first)) > other.depth_sd_m;
-        let others = others.iter().filter(contradicts);
-        let (course, _) = others.filter_map(similar).fold((first, similarity), higher);
-        let is_first = std::ptr::eq(course, first);
-        let heading_rad = if is_first { heading_rad } else { fan.best(place(course))?.0 };
+        let first = self.courses.first()?;
+        let contradicts = |other: &Course| place(other).distance(place(first)) > other.depth_sd_m;
+        let courses =
+            self.courses.iter().filter(|course| std::ptr::eq(*course, first) || contradicts(course));
+        let best = courses.filter_map(|course| Some((course, fan.best(place(course))?)));
+        let higher =
+            |best: (_, (f64, f64)), next: (_, (f64, f64))| if next.1.1 > best.1.1 { next } else { best };
+        let (course, (heading_rad, _)) = best.reduce(higher)?;
         let path = Path { origin: place(course), heading_rad };
         let headed = Course { path, along_m: vec![0.0; frames.len()], ..course.clone() };
         let start = start(frames, &headed, walker, camera, cadence, &options)?;
@@ -280,6 +273,21 @@ mod tests {
             let active = begun(seen, None).unwrap();
             let off_m = active.walk.route.at(0.0).origin.distance(PLACE);
             assert!(off_m < 0.2, "{share}, {below_px} px: {off_m}");
+        }
+    }
+
+    /// Legs alone, seen as somebody far away: the heading in which that somebody is most similar is not the person's.
+    #[test]
+    fn each_place_is_looked_at_in_its_own_heading() {
+        for heading_rad in [0.0, 0.5, PI - 0.5, PI, PI + 0.5] {
+            let mut seen = standing(heading_rad, 0.9, 0.0);
+            for sighting in seen.kept.iter_mut().filter_map(|(sighting, _)| sighting.as_mut()) {
+                let rectangle = &mut sighting.rectangle;
+                rectangle.top += (0.38 * rectangle.height() as f64) as usize;
+            }
+            let active = begun(seen, None).unwrap();
+            let off_m = active.walk.route.at(0.0).origin.distance(PLACE);
+            assert!(off_m < 0.2, "{heading_rad}: {off_m}");
         }
     }
 

@@ -3,7 +3,8 @@
 //! Outlines are almost the same in the heading mirrored at the line of sight with left and right exchanged, as they are
 //! on a line across the image with left and right exchanged alone. So the person is fitted in both headings with both
 //! choices of sides. The distances of the edges decide between the headings: a foot that is farther away stands higher
-//! in the image. The inner lines decide between the sides in each heading, as over ground (`sides`).
+//! in the image. The inner lines decide between the sides in each heading, as over ground (`sides`). The fit of the whole
+//! walk then keeps the heading of the start, which is nearer than one that is fitted together with body and curves.
 
 use super::problem::{Fitted, Problem};
 use super::seen::Seen;
@@ -29,9 +30,13 @@ impl Choice<'_, '_> {
         self.problem.heading_rad(&self.fitted)
     }
 
+    fn turn_to(&self, heading_rad: f64) -> f64 {
+        let turn = self.heading_rad() - heading_rad;
+        (turn - TAU * (turn / TAU).round()).abs()
+    }
+
     fn is_apart(&self, other: &Self) -> bool {
-        let turn = self.heading_rad() - other.heading_rad();
-        (turn - TAU * (turn / TAU).round()).abs() > SAME_HEADING_RAD
+        self.turn_to(other.heading_rad()) > SAME_HEADING_RAD
     }
 }
 
@@ -65,11 +70,22 @@ pub(crate) fn fit_on_the_spot(
     let p_swapped = probability(&|c| c.is_exchanged != here.is_exchanged);
     let other = different.iter().filter(|&&k| choices[k].is_apart(here));
     let other = other.max_by(|&&a, &&b| weights[a].total_cmp(&weights[b]));
+    // Fitted with body and curves, the heading takes a part of the steps' length: of 14 drawn walks 25 to 37 degrees off the
+    // side view it is up to 19 degrees off (rms 9), that of the start up to 7 (rms 4).
+    let starts = [problem, mirrored].into_iter().filter(|_| p_tracked_swapped.is_some());
+    let start_of = |choice: &Choice<'_, '_>| {
+        let turn = |start: &Problem<'_>| choice.turn_to(start.route_heading_rad());
+        starts.clone().min_by(|a, b| turn(a).total_cmp(&turn(b)))
+    };
+    let fit = match start_of(here).and_then(|start| start.with_heading_held(&here.fitted)) {
+        Some((held, fitted)) => held.checked(&fitted, p_swapped),
+        None => here.problem.checked(&here.fitted, p_swapped),
+    }?;
     let mirrored = other.map(|&k| MirroredHeading {
-        heading_rad: choices[k].heading_rad(),
+        heading_rad: start_of(&choices[k])
+            .map_or_else(|| choices[k].heading_rad(), Problem::route_heading_rad),
         probability: probability(&|c| c.is_apart(here)),
     });
-    let fit = here.problem.checked(&here.fitted, p_swapped)?;
     Ok(WalkFit { mirrored, ..fit })
 }
 

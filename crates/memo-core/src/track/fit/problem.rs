@@ -202,6 +202,17 @@ impl<'a> Problem<'a> {
         self
     }
 
+    /// Further steps from a fit, in the heading of the route.
+    pub(super) fn with_heading_held(&self, fitted: &Fitted) -> Option<(Self, Fitted)> {
+        let mut priors = self.priors.clone();
+        priors[WHOLE_HEADING].sd = FIXED_SD_RAD;
+        let held = Self { frames: self.frames.clone(), priors, ..*self };
+        let mut unknowns = fitted.unknowns.clone();
+        unknowns.whole[WHOLE_HEADING] = 0.0;
+        let fitted = held.finished(unknowns)?;
+        Some((held, fitted))
+    }
+
     /// Probability that the sides are those of the `other` fit; `p_tracked` is that by the tracker.
     pub(super) fn p_other_sides(&self, chosen: &Fitted, other: &Fitted, p_tracked: f64) -> f64 {
         sides::p_other(&chosen.seen, &other.seen, p_tracked, self.visible_share)
@@ -245,6 +256,10 @@ impl<'a> Problem<'a> {
 
     pub(super) fn frame_count(&self) -> usize {
         self.frames.len()
+    }
+
+    pub(super) fn route_heading_rad(&self) -> f64 {
+        self.route.at(self.origin_along_m).heading_rad
     }
 
     pub(super) fn heading_rad(&self, fitted: &Fitted) -> f64 {
@@ -610,6 +625,8 @@ const ASSUMED_HEADING_SD_RAD: f64 = 0.02;
 const ASSUMED_ACROSS_SD_M: f64 = 0.1;
 /// What another unknown says is held.
 const HELD_SD: f64 = 1e-3;
+/// Less than all contours of a long walk determine together.
+const FIXED_SD_RAD: f64 = 1e-5;
 /// Standard deviation of the heading about the start's, where nothing but the outlines shows it.
 const UNSEEN_HEADING_SD_RAD: f64 = 0.5;
 /// Random walk of the velocities of the frames' unknowns: per square root of a second, m/s of place and height,

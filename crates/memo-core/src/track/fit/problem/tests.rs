@@ -190,3 +190,22 @@ fn the_sides_of_who_is_hidden_in_part_are_less_certain() {
     let [whole, half] = [log_odds(), log_odds()];
     assert!(whole > 0.5 && (half - 0.5 * whole).abs() < 1e-9, "{whole} {half}");
 }
+
+/// From a start that faces 0.15 radians to the side, a fit turns back; the same with its heading held does not.
+#[test]
+fn a_heading_that_is_held_is_that_of_the_route() {
+    let Drawn { camera, walker, route, frames } = drawn();
+    let options = FitOptions::default();
+    let true_path = route.at(0.0);
+    let beside = Path { heading_rad: true_path.heading_rad + 0.15, ..true_path };
+    let route = Route::from(beside);
+    let problem = Problem::new(&camera, &walker, &route, &frames, &options).on_treadmill();
+    let (start, _) = problem.best_start(0.0).unwrap();
+    let free = problem.finished(start).unwrap();
+    let (held, fitted) = problem.with_heading_held(&free).unwrap();
+    let off_rad =
+        [problem.heading_rad(&free), held.heading_rad(&fitted)].map(|h| h - problem.route_heading_rad());
+    assert!(off_rad[0] < -0.05, "{off_rad:?}");
+    assert!(off_rad[1].abs() < 1e-4, "{off_rad:?}");
+    assert!(held.quality(&fitted).cost > problem.quality(&free).cost, "it fits less well");
+}
