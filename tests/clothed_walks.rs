@@ -439,6 +439,11 @@ fn a_walk_on_a_treadmill_is_recognised_and_has_its_belt_s_speed() {
         let (p_swapped, mirrored) = (followed.walks[0].p_swapped(), treadmill.mirrored);
         println!("P(left and right swapped) {p_swapped:.3}, {mirrored:?}");
         assert!(p_swapped < 0.5 && mirrored.is_none_or(|m| m.probability < OPEN));
+        let apart = |other_rad: f64| (other_rad - followed.rows()[0].heading_rad).cos() < 0.99;
+        assert!(
+            mirrored.is_none_or(|m| apart(m.heading_rad)),
+            "the other heading is another one: {mirrored:?}"
+        );
         let table = followed.walks[0].gait_parameters();
         let of = |wanted| table.iter().find(|p| p.quantity == wanted && p.side.is_none()).unwrap();
         let [right_m, left_m] = [Side::Right, Side::Left].map(|side| followed.scene.step(side).0);

@@ -30,14 +30,15 @@ impl Choice<'_, '_> {
         self.problem.heading_rad(&self.fitted)
     }
 
-    fn turn_to(&self, heading_rad: f64) -> f64 {
-        let turn = self.heading_rad() - heading_rad;
-        (turn - TAU * (turn / TAU).round()).abs()
-    }
-
     fn is_apart(&self, other: &Self) -> bool {
-        self.turn_to(other.heading_rad()) > SAME_HEADING_RAD
+        turn_rad(self.heading_rad(), other.heading_rad()) > SAME_HEADING_RAD
     }
+}
+
+/// The angle between two headings, radians.
+fn turn_rad(a: f64, b: f64) -> f64 {
+    let turn = a - b;
+    (turn - TAU * (turn / TAU).round()).abs()
 }
 
 /// Fits the person in the heading of `problem` and of `mirrored`. `p_tracked_swapped` is the probability by the tracker
@@ -68,24 +69,28 @@ pub(crate) fn fit_on_the_spot(
     };
     let here = &choices[best];
     let p_swapped = probability(&|c| c.is_exchanged != here.is_exchanged);
-    let other = different.iter().filter(|&&k| choices[k].is_apart(here));
-    let other = other.max_by(|&&a, &&b| weights[a].total_cmp(&weights[b]));
     // Fitted with body and curves, the heading takes a part of the steps' length: of 14 drawn walks 25 to 37 degrees off the
     // side view it is up to 19 degrees off (rms 9), that of the start up to 7 (rms 4).
     let starts = [problem, mirrored].into_iter().filter(|_| p_tracked_swapped.is_some());
     let start_of = |choice: &Choice<'_, '_>| {
-        let turn = |start: &Problem<'_>| choice.turn_to(start.route_heading_rad());
+        let turn = |start: &Problem<'_>| turn_rad(choice.heading_rad(), start.route_heading_rad());
         starts.clone().min_by(|a, b| turn(a).total_cmp(&turn(b)))
     };
+    let heading_rad = |choice: &Choice<'_, '_>| {
+        start_of(choice).map_or_else(|| choice.heading_rad(), Problem::route_heading_rad)
+    };
+    let is_other =
+        |choice: &Choice<'_, '_>| turn_rad(heading_rad(choice), heading_rad(here)) > SAME_HEADING_RAD;
+    let other = different.iter().filter(|&&k| is_other(&choices[k]));
+    let other = other.max_by(|&&a, &&b| weights[a].total_cmp(&weights[b]));
+    let mirrored = other.map(|&k| MirroredHeading {
+        heading_rad: heading_rad(&choices[k]),
+        probability: probability(&is_other),
+    });
     let fit = match start_of(here).and_then(|start| start.with_heading_held(&here.fitted)) {
         Some((held, fitted)) => held.checked(&fitted, p_swapped),
         None => here.problem.checked(&here.fitted, p_swapped),
     }?;
-    let mirrored = other.map(|&k| MirroredHeading {
-        heading_rad: start_of(&choices[k])
-            .map_or_else(|| choices[k].heading_rad(), Problem::route_heading_rad),
-        probability: probability(&|c| c.is_apart(here)),
-    });
     Ok(WalkFit { mirrored, ..fit })
 }
 
