@@ -11,6 +11,7 @@ from memo.files import TRACK_COLUMNS
 from memo.gait import lookup
 from memo.plausible import (
     assumed_height_sentences,
+    beside_sentences,
     contradiction_sentences,
     implausible_sentences,
     measured_height_sentences,
@@ -38,6 +39,8 @@ def walk(**values):
         "height_is_contradicted": False,
         "walk_ratio": _memo.WalkRatio(0.006, 0.004, 0.011),
         "fit": types.SimpleNamespace(sole_m=0.002, is_off_ground=False),
+        "unexplained": 0.003,
+        "is_beside_somebody": False,
     }
     return types.SimpleNamespace(**usual | values)
 
@@ -89,6 +92,7 @@ def test_what_is_as_usual_is_not_mentioned():
         assumed_height_sentences,
         measured_height_sentences,
         contradiction_sentences,
+        beside_sentences,
         implausible_sentences,
     ]
     assert [sentence for told in said for sentence in told(walk())] == []
@@ -167,6 +171,32 @@ def test_a_head_below_the_person_s_is_named():
     angles = {name: np.array([1.0]) for name in TRACK_COLUMNS if name.endswith("_deg")}
     said = fit_sentence(types.SimpleNamespace(fit=fit, columns=angles))
     assert "its head 15% of the height below the person's" in said
+
+
+def in_the_shadow(scene, frames_later, columns):
+    """The scene with the same walker once more, as some frames later, behind the first and mostly hidden."""
+    empty = np.median(scene.frames, axis=0)
+    is_seen = abs(scene.frames - empty) > 16
+    middles = [np.nonzero(seen)[1].mean() for seen in is_seen]
+    frames = []
+    for k, frame in enumerate(scene.frames):
+        later = min(k + frames_later, len(scene.frames) - 1)
+        shift = round(middles[k] - middles[later]) + columns
+        behind, is_behind = (np.roll(pixels[later], shift, axis=1) for pixels in (scene.frames, is_seen))
+        frames.append(np.where(is_seen[k] | ~is_behind, frame, behind))
+    return np.array(frames)
+
+
+def test_legs_in_the_shadow_of_somebody_are_mentioned():
+    scene = memo.demo_scene(0, frames=60)
+    given = {"times_s": scene.times_s, "camera": scene.camera, "height_m": scene.height_m}
+    alone = memo.track(scene.frames, **given)
+    assert alone.walks[0].unexplained < 0.006 and not alone.walks[0].is_beside_somebody
+    assert not any("Beside the legs" in said for said in alone.sentences)
+    track = memo.track(in_the_shadow(scene, frames_later=5, columns=-8), **given)
+    assert [said for said in track.sentences if said.startswith("Beside the legs something else moves")]
+    assert any("Beside the legs" in doubt for doubt in track.summary["doubts"])
+    assert 0.012 < track.walks[0].unexplained < 0.3
 
 
 @pytest.mark.parametrize(

@@ -713,6 +713,12 @@ class Walk:
     """Whether the measured height contradicts the given one by more than three standard deviations."""
     walk_ratio: Final[WalkRatio | None]
     """None for backward or very short walks."""
+    unexplained: Final[float | None]
+    """Changes beside the legs that nobody explains who is followed, as a share of the area of two legs: the
+    median over the frames. None if too few frames show it."""
+    is_beside_somebody: Final[bool]
+    """Whether so much changes there that somebody else may walk there who is not followed, or something
+    moves with the person."""
     treadmill: Final[Treadmill | None]
     """None for a walk over ground."""
     fit: Final[WalkFit | None]

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "assumed_height_sentences",
+    "beside_sentences",
     "contradiction_sentences",
     "implausible_sentences",
     "measured_height_sentences",
@@ -97,6 +98,16 @@ def contradiction_sentences(walk: Walk) -> list[str]:
     return [
         f"The given height of {walk.height.height_m:.2f} m contradicts the picture, in which the person is "
         f"{seen.height_m:.2f} m tall (standard deviation {seen.sd_m:.2f} m): check height and camera."
+    ]
+
+
+def beside_sentences(walk: Walk) -> list[str]:
+    """Says that more moves beside the legs than the people who are followed."""
+    if not walk.is_beside_somebody:
+        return []
+    return [
+        "Beside the legs something else moves that is not followed: perhaps somebody behind this person, a "
+        "skirt, a bag or a dog. Check the overlay."
     ]
 
 

@@ -21,6 +21,7 @@ from memo.notebook import table
 from memo.pixels import camera_of_video, columns_of_video, of_video
 from memo.plausible import (
     assumed_height_sentences,
+    beside_sentences,
     contradiction_sentences,
     implausible_sentences,
     measured_height_sentences,
@@ -431,6 +432,7 @@ class Track:
             told += unseen
             told += running_sentences(walk, self._pace(walk)[0])
             told += implausible_sentences(walk)
+            told += beside_sentences(walk)
             if walk.p_swapped > LIKELY_SWAPPED:
                 chance = f"probability {walk.p_swapped:.0%}"
                 told.append(f"Left and right may be swapped ({chance}): check them before use.")
@@ -573,6 +575,7 @@ class Track:
                 *contradiction_sentences(main),
                 *running_sentences(main, speed),
                 *implausible_sentences(main),
+                *beside_sentences(main),
             ],
             "fit": _fit(main),
             "camera_motion": self.camera_motion.summary,

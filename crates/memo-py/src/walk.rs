@@ -200,6 +200,10 @@ result! {
         /// None for backward or very short walks.
         walk_ratio: Option<Py<WalkRatio>> =
             walk.walk_ratio().map(|ratio| Py::new(py, WalkRatio::of(py, ratio)?)).transpose()?,
+        /// Changes beside the legs that nobody explains, as a share of the area of two legs; None if too few frames show it.
+        unexplained: Option<f64> = walk.unexplained,
+        /// True if so much changes there that somebody else may walk there, or something moves with the person.
+        is_beside_somebody: bool = walk.is_beside_somebody(),
         /// None for a walk over ground.
         treadmill: Option<Py<Treadmill>> =
             walk.treadmill().map(|found| Py::new(py, Treadmill::of(py, &found)?)).transpose()?,

@@ -63,6 +63,8 @@ pub(super) struct Active {
     pub(super) earlier: Standing,
     /// What the regions of the frames before the start showed.
     pub(super) before: Vec<Arc<Seen>>,
+    /// What changes beside the legs and nobody explains, in the frames that show it.
+    pub(super) unexplained: Vec<f32>,
     /// What the feet show of somebody who walks towards the camera or away from it.
     pub(super) frontal: Option<Frontal>,
     /// The rows of the rectangles that show where the person is.
@@ -92,6 +94,7 @@ impl Active {
             feet: BTreeMap::new(),
             earlier: Standing::default(),
             before: Vec::new(),
+            unexplained: Vec::new(),
             frontal: None,
             rows: Rows::Both,
         }

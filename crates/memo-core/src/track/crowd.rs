@@ -14,6 +14,9 @@ use crate::model::body::PART_COUNT;
 use crate::model::{Camera, EllipticCylinder};
 use glam::{DVec2, Vec2};
 
+/// The change detection looks at windows of pixels, so changes begin this far from a body, pixels.
+pub(super) const EXPLAINED_PX: f64 = 3.0;
+
 /// One person as expected in a frame.
 #[derive(Debug, Clone)]
 pub(super) struct Expected {
@@ -97,7 +100,7 @@ fn turn(line: &ModelLine, edge: &EdgeLine) -> f32 {
 
 /// Clears the changes that a body explains: within a margin of its parts.
 pub(super) fn clear_explained(mask: &mut Mask, camera: &Camera, body: &[EllipticCylinder], height_px: f64) {
-    paint_body(mask, [0, 0], camera, body, height_px, false);
+    paint_body(mask, [0, 0], camera, body, EXPLAINED * height_px, false);
 }
 
 /// Share of the image on and about a body, as far as nearer bodies leave it free, that changes; `None` if they leave
@@ -111,8 +114,8 @@ pub(super) fn changing_share(
     let (window, height_px) = (&own.window, own.height_px);
     let mut near = Mask::filled(window.width(), window.height(), false);
     let corner = [window.left, window.top];
-    paint_body(&mut near, corner, camera, &own.body, height_px, true);
-    paint_body(&mut near, corner, camera, nearer, height_px, false);
+    paint_body(&mut near, corner, camera, &own.body, EXPLAINED * height_px, true);
+    paint_body(&mut near, corner, camera, nearer, EXPLAINED * height_px, false);
     let (mut all, mut changing) = (0_u32, 0_u32);
     for y in 0..near.height() {
         let row = &mask.row(window.top + y)[window.left..=window.right];
@@ -125,15 +128,14 @@ pub(super) fn changing_share(
 }
 
 /// Sets all pixels within a margin of a body's parts in a part of the image that begins at a corner.
-fn paint_body(
+pub(super) fn paint_body(
     mask: &mut Mask,
     corner: [usize; 2],
     camera: &Camera,
     body: &[EllipticCylinder],
-    height_px: f64,
+    margin_px: f64,
     value: bool,
 ) {
-    let margin_px = EXPLAINED * height_px;
     let corner = DVec2::from(corner.map(|x| x as f64));
     for part in body {
         let axis = part.world_from_cylinder.matrix3.z_axis * part.half_length;

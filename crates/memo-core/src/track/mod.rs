@@ -37,6 +37,7 @@ pub mod swap;
 pub(crate) mod tracker;
 mod trail;
 pub mod treadmill;
+mod unexplained;
 pub mod walk;
 
 pub use event::EventKind;

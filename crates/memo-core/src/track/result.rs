@@ -56,6 +56,9 @@ pub struct TrackedWalk {
     /// Row of the crown in each row by the changes, pixels; `None` where they do not show the person alone. Empty without
     /// a fit.
     pub crowns_px: Vec<Option<f64>>,
+    /// Changes beside the legs that nobody explains who is followed, as a share of the area of two legs: the median over the
+    /// frames; `None` if too few show it. [`TrackedWalk::is_beside_somebody`] judges it.
+    pub unexplained: Option<f64>,
     /// The fit of the person, or why there is none; `None` if none was asked for.
     pub fit: Option<Result<WalkFit, FitError>>,
     /// The options used.

@@ -62,6 +62,7 @@ pub fn tracked(walk: Walk, start: StartReport, options: WalkOptions) -> TrackedW
         is_on_treadmill: false,
         is_frontal: false,
         crowns_px: Vec::new(),
+        unexplained: None,
         height: BodyHeight::given(1.75),
         depth_sd_m: 0.0,
         start,

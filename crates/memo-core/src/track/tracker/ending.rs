@@ -10,6 +10,7 @@ use super::super::people::Sign;
 use super::super::result::TrackedWalk;
 use super::super::standing::Standing;
 use super::super::steady::Loss;
+use super::super::unexplained;
 use super::Tracker;
 use super::unfollowed::walk_boxes;
 
@@ -139,6 +140,7 @@ impl Tracker {
             person: active.person,
             camera_turns: active.turns(self.stream.camera_motions()),
             crowns_px: active.crowns_px(),
+            unexplained: unexplained::of_walk(active.unexplained.clone()),
             height: active.height_by(fit.as_ref().and_then(|fit| fit.as_ref().ok())),
             is_frontal: active.is_frontal(),
             walk: active.walk,

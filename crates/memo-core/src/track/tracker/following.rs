@@ -6,6 +6,7 @@ use super::super::decisions::OUTSIDE_SHARE;
 use super::super::evidence::Evidence;
 use super::super::fit::views::Piece;
 use super::super::height::is_as_tall;
+use super::super::unexplained::beside_legs;
 use super::super::walk::FrameEdges;
 use super::{TrackError, Tracker, WINDOW_MARGIN_PX, feet, whole};
 use crate::image::{Rectangle, Sides};
@@ -112,7 +113,18 @@ impl Tracker {
             self.settle(k);
             self.people[k].turn(&self.options);
         }
+        self.note_unexplained(evidence);
         Ok(())
+    }
+
+    /// Notes what changes beside the legs of everybody who is followed.
+    fn note_unexplained(&mut self, evidence: &Evidence) {
+        let bodies: Vec<_> = self.people.iter().map(Active::body).collect();
+        let followed: Vec<&[EllipticCylinder]> = bodies.iter().flatten().map(|body| &body[..]).collect();
+        for (active, own) in self.people.iter_mut().zip(&bodies) {
+            let share = own.and_then(|own| beside_legs(&evidence.firm_mask, &active.camera, &own, &followed));
+            active.unexplained.extend(share);
+        }
     }
 
     /// True for somebody who was started beside another person and may be a part of that person.

@@ -1,0 +1,162 @@
+//! Changes beside the legs of a person that no body explains: somebody who is hidden, a skirt, a bag, a dog.
+//!
+//! Somebody who walks in another's shadow has no region of changes of its own, so nobody is started. But legs are in step with
+//! nobody else's, and the legs of who is followed are modelled better than arms, hair and clothes are. So what changes
+//! clearly between hip and ankle, more than shadows do, beyond a margin of all bodies that are followed, is counted:
+//!
+//! 1. In each frame, as a share of the area of two legs, without what changes as often farther away (noise, a shaken camera).
+//! 2. Of a walk, the median over its frames.
+//!
+//! Limits: that it is a person is not known. Who is hidden in most frames, or in clothes that hardly differ from the wall, is not
+//! noticed.
+
+use super::crowd::{EXPLAINED_PX, body_box, paint_body};
+use super::decisions::HIDDEN_SHARE;
+use super::result::TrackedWalk;
+use crate::image::{Mask, Sides};
+use crate::model::{Camera, EllipticCylinder};
+use glam::{DVec2, USizeVec2};
+
+/// The area of two legs of average size, as a share of the square of the body height.
+const LEGS: f64 = 0.072;
+/// Changes within this share of the height of a body are its own. With 0.05, those beside a filmed person in wide trousers are 0.032
+/// instead of 0.005 of the legs, beside hidden people they are 0.05 to 0.18 instead of 0.024 to 0.094; with 0.08, 0 and 0.005 to 0.04.
+const MARGIN: f64 = 0.065;
+/// Rows between ankle and hip, shares of the body height above the lowest point.
+const ROWS: [f64; 2] = [0.1, 0.42];
+/// Columns on either side of the middle of the body that are beside the legs, and those beyond that tell how much changes
+/// anyway, shares of the body height.
+const BESIDE: f64 = 0.35;
+const BEYOND: f64 = 0.65;
+/// A walk with fewer frames that show the legs tells nothing.
+const LEAST_FRAMES: usize = 13;
+
+/// Changes beside the legs of a body that none of the bodies explains, as a share of the area of two legs; below 0 if less
+/// changes there than farther away, `None` if the image does not show all that is beside the legs.
+pub(super) fn beside_legs(
+    mask: &Mask,
+    camera: &Camera,
+    own: &[EllipticCylinder],
+    bodies: &[&[EllipticCylinder]],
+) -> Option<f32> {
+    // 1. The rows and columns.
+    let Sides { left, top, right, bottom } = body_box(camera, own)?;
+    let (height_px, middle) = (bottom - top, 0.5 * (left + right));
+    let size = DVec2::new(mask.width() as f64, mask.height() as f64);
+    let [beside, beyond] = [BESIDE, BEYOND].map(|share| {
+        let low = DVec2::new(middle - share * height_px, bottom - ROWS[1] * height_px);
+        let high = DVec2::new(middle + share * height_px, bottom - ROWS[0] * height_px);
+        [low, high]
+    });
+    if beside[0].min_element() < 0.0 || beside[1].cmpge(size - 1.0).any() {
+        return None;
+    }
+    let low: USizeVec2 = beyond[0].max(DVec2::ZERO).as_usizevec2();
+    let high: USizeVec2 = beyond[1].min(size - 1.0).as_usizevec2();
+    // 2. What the bodies leave free.
+    let mut free = Mask::filled(high.x - low.x + 1, high.y - low.y + 1, true);
+    for body in bodies {
+        let Some(Sides { top, bottom, .. }) = body_box(camera, body) else { continue };
+        let margin_px = MARGIN * (bottom - top) + EXPLAINED_PX;
+        paint_body(&mut free, low.into(), camera, body, margin_px, false);
+    }
+    // 3. Pixels and changes, beside the legs and beyond.
+    let (mut near, mut far) = ([0_u32; 2], [0_u32; 2]);
+    for y in 0..free.height() {
+        let changes = &mask.row(low.y + y)[low.x..=high.x];
+        for (x, (_, &changes)) in free.row(y).iter().zip(changes).enumerate().filter(|(_, (free, _))| **free)
+        {
+            let is_near = ((low.x + x) as f64 - middle).abs() <= BESIDE * height_px;
+            let counts = if is_near { &mut near } else { &mut far };
+            *counts = [counts[0] + 1, counts[1] + u32::from(changes)];
+        }
+    }
+    let anyway = f64::from(far[1]) / f64::from(far[0].max(1));
+    let more_px = f64::from(near[1]) - anyway * f64::from(near[0]);
+    Some((more_px / (LEGS * height_px * height_px)) as f32)
+}
+
+/// The median of those of a walk's frames; `None` of too few.
+pub(super) fn of_walk(mut shares: Vec<f32>) -> Option<f64> {
+    let middle = shares.len() / 2;
+    (shares.len() >= LEAST_FRAMES)
+        .then(|| f64::from(*shares.select_nth_unstable_by(middle, f32::total_cmp).1))
+}
+
+impl TrackedWalk {
+    /// True if so much changes beside the legs that somebody else may walk there who is not followed, or something moves with
+    /// the person.
+    #[must_use]
+    pub fn is_beside_somebody(&self) -> bool {
+        self.unexplained.is_some_and(|share| share > HIDDEN_SHARE)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::active::tests::PATH;
+    use super::super::crowd::clear_explained;
+    use super::super::search::tests::{camera, walker};
+    use super::super::search::{Hypothesis, Scene};
+    use super::*;
+    use crate::model::body::PART_COUNT;
+
+    fn body(along_m: f64, phase: f64) -> [EllipticCylinder; PART_COUNT] {
+        let (camera, walker) = (camera(), walker());
+        let hypothesis = Hypothesis { along_m, height_m: 1.15, phase };
+        Scene::new(&walker, &camera, &PATH).pose(&hypothesis).cylinders
+    }
+
+    /// Changes where these bodies are.
+    fn mask(bodies: &[&[EllipticCylinder]]) -> Mask {
+        let mut still = Mask::filled(640, 480, true);
+        for body in bodies {
+            clear_explained(&mut still, &camera(), body, 0.0);
+        }
+        let mut mask = Mask::filled(640, 480, false);
+        (0..480).for_each(|y| (0..640).for_each(|x| mask.set(x, y, !still.at(x, y))));
+        mask
+    }
+
+    #[test]
+    fn legs_of_somebody_else_are_seen_and_those_of_who_is_followed_are_not() {
+        let (own, other) = (body(0.0, 0.1), body(0.25, 0.35));
+        let seen = |bodies: &[&[EllipticCylinder]], followed: &[&[EllipticCylinder]]| {
+            beside_legs(&mask(bodies), &camera(), &own, followed).unwrap()
+        };
+        assert_eq!(seen(&[&own], &[&own]), 0.0);
+        let hidden = seen(&[&own, &other], &[&own]);
+        assert!((0.15..1.0).contains(&hidden), "{hidden}");
+        assert_eq!(seen(&[&own, &other], &[&own, &other]), 0.0);
+        // Arms and head beside the person are no legs.
+        let above: Vec<EllipticCylinder> = other.iter().filter(|c| c.centre().z > 1.1).copied().collect();
+        assert!(seen(&[&own, &above], &[&own]) < 0.02);
+    }
+
+    #[test]
+    fn what_changes_everywhere_is_nobody() {
+        let own = body(0.0, 0.1);
+        let mut noisy = mask(&[&own]);
+        (0..480).for_each(|y| {
+            (0..640).for_each(|x| {
+                if (7 * x + 13 * y) % 10 == 0 {
+                    noisy.set(x, y, true);
+                }
+            });
+        });
+        let share = beside_legs(&noisy, &camera(), &own, &[&own]).unwrap();
+        assert!(share.abs() < 0.02, "{share}");
+    }
+
+    #[test]
+    fn near_the_border_and_in_few_frames_nothing_is_known() {
+        let camera = camera();
+        let at_border = body(3.2, 0.1);
+        let blank = Mask::filled(640, 480, false);
+        assert_eq!(beside_legs(&blank, &camera, &at_border, &[&at_border]), None);
+        assert_eq!(of_walk(vec![0.5; LEAST_FRAMES - 1]), None);
+        let mut shares = vec![0.0; LEAST_FRAMES];
+        shares[..LEAST_FRAMES / 2].fill(0.9);
+        assert_eq!(of_walk(shares), Some(0.0), "half of the frames are too few");
+    }
+}
