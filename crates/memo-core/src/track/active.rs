@@ -64,7 +64,7 @@ pub(super) struct Active {
     /// What the regions of the frames before the start showed.
     pub(super) before: Vec<Arc<Seen>>,
     /// What changes beside the legs and nobody explains, in the frames that show it.
-    pub(super) unexplained: Vec<f32>,
+    pub(super) unexplained: Vec<f64>,
     /// What the feet show of somebody who walks towards the camera or away from it.
     pub(super) frontal: Option<Frontal>,
     /// The rows of the rectangles that show where the person is.

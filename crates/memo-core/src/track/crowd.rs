@@ -14,9 +14,6 @@ use crate::model::body::PART_COUNT;
 use crate::model::{Camera, EllipticCylinder};
 use glam::{DVec2, Vec2};
 
-/// The change detection looks at windows of pixels, so changes begin this far from a body, pixels.
-pub(super) const EXPLAINED_PX: f64 = 3.0;
-
 /// One person as expected in a frame.
 #[derive(Debug, Clone)]
 pub(super) struct Expected {

@@ -117,6 +117,7 @@ impl Active {
         joined
             .pieces
             .extend(since.chain(later.pieces.iter().filter(|piece| piece.frame > own_last)).cloned());
+        joined.unexplained.extend(&later.unexplained);
         joined.frontal = Some(frontal);
         joined.follow_on(&route, 0..joined.kept.len(), usize::MAX, &options.walk);
         Some(joined)

@@ -1,18 +1,19 @@
 //! Changes beside the legs of a person that no body explains: somebody who is hidden, a skirt, a bag, a dog.
 //!
-//! Somebody who walks in another's shadow has no region of changes of its own, so nobody is started. But legs are in step with
-//! nobody else's, and the legs of who is followed are modelled better than arms, hair and clothes are. So what changes
-//! clearly between hip and ankle, more than shadows do, beyond a margin of all bodies that are followed, is counted:
+//! Somebody who walks in another's shadow has no region of changes, so nobody is started. But the legs of two people are hardly
+//! ever in step, and the legs of somebody who is followed are modelled better than arms, hair and clothes are. So what
+//! changes between ankle and thigh, more than shadows do, beyond a margin of all bodies that are followed, is counted:
 //!
 //! 1. In each frame, as a share of the area of two legs, without what changes as often farther away (noise, a shaken camera).
 //! 2. Of a walk, the median over its frames.
 //!
-//! Limits: that it is a person is not known. Who is hidden in most frames, or in clothes that hardly differ from the wall, is not
-//! noticed.
+//! Limits: that it is a person is not known. Somebody whose legs are wholly hidden in half of the frames, or hardly differ from the
+//! wall, is not noticed, and in a crowd, where as much changes farther out, nobody is.
 
-use super::crowd::{EXPLAINED_PX, body_box, paint_body};
+use super::crowd::{body_box, paint_body};
 use super::decisions::HIDDEN_SHARE;
 use super::result::TrackedWalk;
+use crate::estimate::median::median;
 use crate::image::{Mask, Sides};
 use crate::model::{Camera, EllipticCylinder};
 use glam::{DVec2, USizeVec2};
@@ -22,7 +23,9 @@ const LEGS: f64 = 0.072;
 /// Changes within this share of the height of a body are its own. With 0.05, those beside a filmed person in wide trousers are 0.032
 /// instead of 0.005 of the legs, beside hidden people they are 0.05 to 0.18 instead of 0.024 to 0.094; with 0.08, 0 and 0.005 to 0.04.
 const MARGIN: f64 = 0.065;
-/// Rows between ankle and hip, shares of the body height above the lowest point.
+/// The change detection looks at windows of pixels, so changes begin this far from a body, pixels.
+const MARGIN_PX: f64 = 3.0;
+/// Rows between ankle and thigh, shares of the body height above the lowest point.
 const ROWS: [f64; 2] = [0.1, 0.42];
 /// Columns on either side of the middle of the body that are beside the legs, and those beyond that tell how much changes
 /// anyway, shares of the body height.
@@ -38,7 +41,7 @@ pub(super) fn beside_legs(
     camera: &Camera,
     own: &[EllipticCylinder],
     bodies: &[&[EllipticCylinder]],
-) -> Option<f32> {
+) -> Option<f64> {
     // 1. The rows and columns.
     let Sides { left, top, right, bottom } = body_box(camera, own)?;
     let (height_px, middle) = (bottom - top, 0.5 * (left + right));
@@ -57,7 +60,7 @@ pub(super) fn beside_legs(
     let mut free = Mask::filled(high.x - low.x + 1, high.y - low.y + 1, true);
     for body in bodies {
         let Some(Sides { top, bottom, .. }) = body_box(camera, body) else { continue };
-        let margin_px = MARGIN * (bottom - top) + EXPLAINED_PX;
+        let margin_px = MARGIN * (bottom - top) + MARGIN_PX;
         paint_body(&mut free, low.into(), camera, body, margin_px, false);
     }
     // 3. Pixels and changes, beside the legs and beyond.
@@ -73,14 +76,12 @@ pub(super) fn beside_legs(
     }
     let anyway = f64::from(far[1]) / f64::from(far[0].max(1));
     let more_px = f64::from(near[1]) - anyway * f64::from(near[0]);
-    Some((more_px / (LEGS * height_px * height_px)) as f32)
+    Some(more_px / (LEGS * height_px * height_px))
 }
 
 /// The median of those of a walk's frames; `None` of too few.
-pub(super) fn of_walk(mut shares: Vec<f32>) -> Option<f64> {
-    let middle = shares.len() / 2;
-    (shares.len() >= LEAST_FRAMES)
-        .then(|| f64::from(*shares.select_nth_unstable_by(middle, f32::total_cmp).1))
+pub(super) fn of_walk(shares: &[f64]) -> Option<f64> {
+    if shares.len() < LEAST_FRAMES { None } else { median(&mut shares.to_vec()) }
 }
 
 impl TrackedWalk {
@@ -154,9 +155,9 @@ mod tests {
         let at_border = body(3.2, 0.1);
         let blank = Mask::filled(640, 480, false);
         assert_eq!(beside_legs(&blank, &camera, &at_border, &[&at_border]), None);
-        assert_eq!(of_walk(vec![0.5; LEAST_FRAMES - 1]), None);
-        let mut shares = vec![0.0; LEAST_FRAMES];
+        assert_eq!(of_walk(&[0.5; LEAST_FRAMES - 1]), None);
+        let mut shares = [0.0; LEAST_FRAMES];
         shares[..LEAST_FRAMES / 2].fill(0.9);
-        assert_eq!(of_walk(shares), Some(0.0), "half of the frames are too few");
+        assert_eq!(of_walk(&shares), Some(0.0), "half of the frames are too few");
     }
 }

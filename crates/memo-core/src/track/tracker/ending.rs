@@ -140,7 +140,7 @@ impl Tracker {
             person: active.person,
             camera_turns: active.turns(self.stream.camera_motions()),
             crowns_px: active.crowns_px(),
-            unexplained: unexplained::of_walk(active.unexplained.clone()),
+            unexplained: unexplained::of_walk(&active.unexplained),
             height: active.height_by(fit.as_ref().and_then(|fit| fit.as_ref().ok())),
             is_frontal: active.is_frontal(),
             walk: active.walk,
