@@ -149,8 +149,9 @@ pub(in crate::track) const TURNED: f32 = 0.075;
 /// Changes within this share of the height of a body are explained by it.
 pub(in crate::track) const EXPLAINED: f64 = 0.05;
 /// More unexplained changes beside the legs than this share of their area: somebody may be hidden there. Of 25 drawn people alone and
-/// two filmed ones, the median over the frames is at most 0.005 (a shadow on the wall), of 39 beside others who were followed 0.014;
-/// beside seven of whom somebody else was not followed, or only for a third of the way, it is 0.024 to 0.094.
+/// two filmed ones, the median over the frames is at most 0.005 (a shadow on the wall), of 39 beside others who were followed 0.006,
+/// and 0.014 where two heights were given in the wrong order; beside seven of whom somebody else was not followed, or only for
+/// a third of the way, it is 0.024 to 0.094.
 pub(in crate::track) const HIDDEN_SHARE: f64 = 0.018;
 
 // How well the person fits.
