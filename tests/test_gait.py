@@ -67,7 +67,7 @@ def motion_captured(clip, rows_s):
         pytest.param(
             name,
             marks=pytest.mark.xfail(
-                strict=True, reason="contacts of this slow person are 40 ms off on one side"
+                strict=True, reason="contacts of this slow person are 30 ms earlier on one side"
             ),
         )
         if name == "mocap_c_yaw25"

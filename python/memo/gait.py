@@ -63,8 +63,8 @@ DEFINITIONS: dict[str, str] = {
     "measured.",
     "stance": "Share of the cycle in which a foot is on the ground: from the initial contact to the toe-off "
     "of the fitted foot, of each side and of both together. Interval: scatter over the steps, errors that a "
-    "person's contacts have in common (23 ms) and toe-offs (55 ms, because shoes bend at the toes and the "
-    "model's foot does not), and by side 9 ms of that side's own.",
+    "person's contacts have in common (21 ms) and toe-offs (55 ms, because shoes bend at the toes and the "
+    "model's foot does not), and by side 6.5 ms of that side's own.",
     "swing": "Share of the cycle in which a foot is off the ground, 100 - stance.",
     "single_support": "Share of the cycle in which one foot alone is on the ground, 100 - double_support; by "
     "side, in which that foot is, the other's swing.",

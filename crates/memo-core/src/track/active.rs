@@ -65,6 +65,8 @@ pub(super) struct Active {
     pub(super) before: Vec<Arc<Seen>>,
     /// What changes beside the legs and nobody explains, in the frames that show it.
     pub(super) unexplained: Vec<f64>,
+    /// What changes at the legs and the others who are followed do not explain, of somebody who was started beside them.
+    pub(super) of_its_own: Vec<f64>,
     /// What the feet show of somebody who walks towards the camera or away from it.
     pub(super) frontal: Option<Frontal>,
     /// The rows of the rectangles that show where the person is.
@@ -95,6 +97,7 @@ impl Active {
             earlier: Standing::default(),
             before: Vec::new(),
             unexplained: Vec::new(),
+            of_its_own: Vec::new(),
             frontal: None,
             rows: Rows::Both,
         }

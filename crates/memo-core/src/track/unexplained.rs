@@ -7,11 +7,14 @@
 //! 1. In each frame, as a share of the area of two legs, without what changes as often farther away (noise, a shaken camera).
 //! 2. Of a walk, the median over its frames.
 //!
+//! A model that was started beside others and has no legs of its own, because the others explain all that changes there, is
+//! that of nobody: it lies on what another model leaves over, as a head.
+//!
 //! Limits: that it is a person is not known. Somebody whose legs are wholly hidden in half of the frames, or hardly differ from the
 //! wall, is not noticed, and in a crowd, where as much changes farther out, nobody is.
 
 use super::crowd::{body_box, paint_body};
-use super::decisions::HIDDEN_SHARE;
+use super::decisions::{HIDDEN_SHARE, OWN_SHARE};
 use super::result::TrackedWalk;
 use crate::estimate::median::median;
 use crate::image::{Mask, Sides};
@@ -33,15 +36,27 @@ const BESIDE: f64 = 0.35;
 const BEYOND: f64 = 0.65;
 /// A walk with fewer frames that show the legs tells nothing.
 const LEAST_FRAMES: usize = 13;
+/// The same of legs that are those of others, in this share of the frames.
+const LEAST_OWN_FRAMES: usize = 5;
+const MOSTLY: f64 = 0.9;
 
-/// Changes beside the legs of a body that none of the bodies explains, as a share of the area of two legs; below 0 if less
-/// changes there than farther away, `None` if the image does not show all that is beside the legs.
+/// Changes in a frame that bodies do not explain, as shares of the area of two legs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Unexplained {
+    /// At the legs of one body, and beside them.
+    pub at_legs: f64,
+    /// The same without what changes as often farther away; below 0 if more changes there.
+    pub more: f64,
+}
+
+/// Changes at and beside the legs of a body that these bodies do not explain; `None` if the image does not show all that is
+/// beside the legs.
 pub(super) fn beside_legs(
     mask: &Mask,
     camera: &Camera,
     own: &[EllipticCylinder],
     bodies: &[&[EllipticCylinder]],
-) -> Option<f64> {
+) -> Option<Unexplained> {
     // 1. The rows and columns.
     let Sides { left, top, right, bottom } = body_box(camera, own)?;
     let (height_px, middle) = (bottom - top, 0.5 * (left + right));
@@ -75,13 +90,21 @@ pub(super) fn beside_legs(
         }
     }
     let anyway = f64::from(far[1]) / f64::from(far[0].max(1));
-    let more_px = f64::from(near[1]) - anyway * f64::from(near[0]);
-    Some(more_px / (LEGS * height_px * height_px))
+    let [free_px, changes_px] = near.map(f64::from);
+    let share = |px: f64| px / (LEGS * height_px * height_px);
+    Some(Unexplained { at_legs: share(changes_px), more: share(changes_px - anyway * free_px) })
 }
 
 /// The median of those of a walk's frames; `None` of too few.
 pub(super) fn of_walk(shares: &[f64]) -> Option<f64> {
     if shares.len() < LEAST_FRAMES { None } else { median(&mut shares.to_vec()) }
+}
+
+/// True if a body has hardly any legs of its own: all that changes there, in nearly all of the frames, the others explain.
+pub(super) fn has_no_legs(of_its_own: &[f64]) -> bool {
+    let mut shares = of_its_own.to_vec();
+    shares.sort_by(f64::total_cmp);
+    shares.len() >= LEAST_OWN_FRAMES && shares[(MOSTLY * (shares.len() - 1) as f64) as usize] < OWN_SHARE
 }
 
 impl TrackedWalk {
@@ -123,7 +146,7 @@ mod tests {
     fn legs_of_somebody_else_are_seen_and_those_of_who_is_followed_are_not() {
         let (own, other) = (body(0.0, 0.1), body(0.25, 0.35));
         let seen = |bodies: &[&[EllipticCylinder]], followed: &[&[EllipticCylinder]]| {
-            beside_legs(&mask(bodies), &camera(), &own, followed).unwrap()
+            beside_legs(&mask(bodies), &camera(), &own, followed).unwrap().more
         };
         assert_eq!(seen(&[&own], &[&own]), 0.0);
         let hidden = seen(&[&own, &other], &[&own]);
@@ -132,6 +155,25 @@ mod tests {
         // Arms and head beside the person are no legs.
         let above: Vec<EllipticCylinder> = other.iter().filter(|c| c.centre().z > 1.1).copied().collect();
         assert!(seen(&[&own, &above], &[&own]) < 0.02);
+    }
+
+    /// Half hidden legs are somebody's own, whether of all else as much changes or not; those of another model are not.
+    #[test]
+    fn a_second_model_of_one_person_has_no_legs() {
+        let (front, behind) = (body(0.0, 0.1), body(0.3, 0.35));
+        let of_its_own = |bodies: &[&[EllipticCylinder]]| {
+            beside_legs(&mask(bodies), &camera(), &behind, &[&front]).unwrap().at_legs
+        };
+        let (alone, two) = (of_its_own(&[&front]), of_its_own(&[&front, &behind]));
+        assert!(alone < 0.02 && two > 2.0 * OWN_SHARE, "{alone} {two}");
+        assert!(has_no_legs(&[alone; 9]) && !has_no_legs(&[two; 9]));
+        // Somebody may be hidden in most of the frames.
+        let mut shares = [alone; 20];
+        shares[..3].fill(two);
+        assert!(!has_no_legs(&shares));
+        shares[1..3].fill(alone);
+        assert!(has_no_legs(&shares));
+        assert!(!has_no_legs(&[alone; LEAST_OWN_FRAMES - 1]), "few frames tell nothing");
     }
 
     #[test]
@@ -146,7 +188,7 @@ mod tests {
             });
         });
         let share = beside_legs(&noisy, &camera(), &own, &[&own]).unwrap();
-        assert!(share.abs() < 0.02, "{share}");
+        assert!(share.more.abs() < 0.02 && share.at_legs > 0.05, "{share:?}");
     }
 
     #[test]

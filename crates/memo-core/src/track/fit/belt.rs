@@ -6,8 +6,9 @@
 //! an error dh of the heading h changes the speed by tan h dh.
 
 use super::super::decisions::{BELT_COMMON_SHARE, BELT_HEADING_SD_RAD, BELT_STANCE_SHARE};
+use super::contacts::Feet;
 use crate::estimate::line::line_through;
-use glam::{DVec2, DVec3};
+use glam::DVec2;
 
 /// Speed of the belt, backwards under a walker who walks forwards.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -30,16 +31,10 @@ const LEAST_FRAMES: usize = 3;
 
 /// The belt's speed; `None` if no stance was seen from its beginning to its end. `feet` has heel and toes of the right
 /// and the left foot in each frame, metres; `sight` leads from the camera to the person.
-pub fn belt(
-    times_s: &[f64],
-    phases: &[f64],
-    feet: &[[[DVec3; 2]; 2]],
-    ahead: DVec2,
-    sight: DVec2,
-) -> Option<Belt> {
+pub fn belt(times_s: &[f64], phases: &[f64], feet: &[Feet], ahead: DVec2, sight: DVec2) -> Option<Belt> {
     let mut speeds = Vec::new();
     for side in 0..2 {
-        let heel = |feet: &[[DVec3; 2]; 2]| feet[side][0].truncate().dot(ahead);
+        let heel = |feet: &Feet| feet[side][0].truncate().dot(ahead);
         let places: Vec<[f64; 3]> =
             (0..times_s.len()).map(|k| [phases[k] + 0.5 * side as f64, times_s[k], heel(&feet[k])]).collect();
         let (first, last) = (places.first()?[0].ceil() as i64, places.last()?[0].floor() as i64);
@@ -55,7 +50,7 @@ pub fn belt(
 }
 
 /// The feet where they would be if the belt stood still and the walker moved on with this velocity.
-pub fn move_with(feet: &mut [[[DVec3; 2]; 2]], times_s: &[f64], velocity: DVec2) {
+pub fn move_with(feet: &mut [Feet], times_s: &[f64], velocity: DVec2) {
     for (feet, time_s) in feet.iter_mut().zip(times_s) {
         let way = (velocity * *time_s).extend(0.0);
         feet.iter_mut().flatten().for_each(|point| *point += way);
@@ -81,11 +76,12 @@ fn stance_speed(places: &[[f64; 3]], strike: f64) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use glam::DVec3;
     use std::f64::consts::FRAC_PI_2;
 
     /// Feet that are carried back by `belt` m/s while flat, from 0.1 to 0.4 of the cycle of a second, at 0.8 of that in
     /// the rest of a stance until 0.6, and then come back.
-    fn feet(time_s: f64, belt: f64) -> [[DVec3; 2]; 2] {
+    fn feet(time_s: f64, belt: f64) -> Feet {
         let place = |t: f64| {
             let at = t.rem_euclid(1.0);
             let flat = at.clamp(0.1, 0.4) - 0.1;

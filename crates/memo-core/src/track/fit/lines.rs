@@ -8,6 +8,7 @@
 //! Limbs taper: a contour point at the height z of a cylinder, -1 to 1, is moved outwards by the share z · taper of
 //! its radius. Hidden-line removal uses the cylinders without taper.
 
+use super::contacts::Feet;
 use super::edge_search::Profile;
 use super::unknowns::{
     ACROSS, ALONG, ANGLES, ANKLE, BODY, CROWN, FOOT, FOREARM, HEAD_FORWARD, HEADING, HEEL, HEIGHT, HIP_WIDTH,
@@ -357,6 +358,11 @@ impl Figure {
         let axes = foot.world_from_cylinder.matrix3;
         let down = axes.x_axis * (-axes.x_axis.z.signum() * foot.semi_axes.x);
         foot.centre() + axes.z_axis * (share * foot.half_length) + down
+    }
+
+    /// Heel and toes of the right and the left foot.
+    pub fn feet(&self) -> Feet {
+        [0, 1].map(|side| [-1.0, 1.0].map(|end| self.sole(side, end)))
     }
 
     /// Derivatives by the figure of the height of a point under a foot.

@@ -358,7 +358,11 @@ impl<'a> Problem<'a> {
 
     /// The figure of a frame.
     fn figure(&self, unknowns: &Unknowns, frame: usize) -> Figure {
-        let (whole, frame) = (&unknowns.whole, &unknowns.frames[frame]);
+        self.figure_of(&unknowns.whole, &unknowns.frames[frame])
+    }
+
+    /// The figure with these unknowns.
+    fn figure_of(&self, whole: &[f64], frame: &[f64; FRAME]) -> Figure {
         let body = body(&self.walker.body, whole);
         let tangent = self.tangent(frame);
         let along_m = self.along(frame);

@@ -10,7 +10,7 @@ use super::super::people::Sign;
 use super::super::result::TrackedWalk;
 use super::super::standing::Standing;
 use super::super::steady::Loss;
-use super::super::unexplained;
+use super::super::unexplained::{self, has_no_legs};
 use super::Tracker;
 use super::unfollowed::walk_boxes;
 
@@ -73,13 +73,16 @@ impl Tracker {
 
     /// 1. The route and its frames, from before and after each of them.
     /// 2. The person, fitted to all of them.
-    /// 3. What is no walk, or a second model of somebody else, is withdrawn.
+    /// 3. What is no walk, or a second model of somebody else, or has no legs of its own, is withdrawn.
     pub(super) fn end_walk(&mut self, active: Active) {
         let mut active = if active.settled { active } else { self.begun_on_the_spot(active) };
         let standing = self.complete(&mut active);
         let walk_boxes = walk_boxes(&active);
         if !active.is_walk() {
             return self.withdraw(active.person, walk_boxes, Reason::NotWalking);
+        }
+        if has_no_legs(&active.of_its_own) {
+            return self.withdraw(active.person, walk_boxes, Reason::Beside);
         }
         let p_swapped = active.p_swapped(&self.options);
         let fit = active.fit(&self.backdrop, &self.options, Some(p_swapped));

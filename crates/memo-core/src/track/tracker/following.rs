@@ -121,9 +121,19 @@ impl Tracker {
     fn note_unexplained(&mut self, evidence: &Evidence) {
         let bodies: Vec<_> = self.people.iter().map(Active::body).collect();
         let followed: Vec<&[EllipticCylinder]> = bodies.iter().flatten().map(|body| &body[..]).collect();
-        for (active, own) in self.people.iter_mut().zip(&bodies) {
-            let share = own.and_then(|own| beside_legs(&evidence.firm_mask, &active.camera, &own, &followed));
-            active.unexplained.extend(share);
+        for (k, active) in self.people.iter_mut().enumerate() {
+            let Some(own) = &bodies[k] else { continue };
+            let beside = |bodies: &[&[EllipticCylinder]]| {
+                beside_legs(&evidence.firm_mask, &active.camera, own, bodies)
+            };
+            let share = beside(&followed);
+            let of_its_own = active.started_near.then(|| {
+                let others = bodies.iter().enumerate().filter(|(other, _)| *other != k);
+                let others: Vec<_> = others.filter_map(|(_, body)| Some(&body.as_ref()?[..])).collect();
+                beside(&others)
+            });
+            active.unexplained.extend(share.map(|share| share.more));
+            active.of_its_own.extend(of_its_own.flatten().map(|share| share.at_legs));
         }
     }
 

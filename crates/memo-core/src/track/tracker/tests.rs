@@ -714,6 +714,35 @@ fn a_second_model_of_somebody_whose_walk_was_taken_is_withdrawn() {
     assert_eq!([true, false].map(walks), [1, 1]);
 }
 
+/// What is left over from one person can look like a second one.
+#[test]
+fn who_was_started_beside_somebody_and_has_no_legs_is_withdrawn() {
+    let people = |share: f64| {
+        let mut tracker = following_two(0.8);
+        tracker.people[1].of_its_own = vec![share; 9];
+        tracker.finish().unwrap();
+        tracker.take_finished().iter().map(|walk| walk.person).collect::<Vec<_>>()
+    };
+    assert_eq!(people(0.5), [0, 1]);
+    assert_eq!(people(0.0), [0]);
+    // Changes everywhere are also at the legs of who was started beside the other; of who was not, none are noted.
+    let mut tracker = following_two(0.8);
+    tracker.people[1].started_near = true;
+    let mut seen = evidence(40, &[]);
+    let noted = |tracker: &mut Tracker, seen: &Evidence| {
+        tracker.advance(seen).unwrap();
+        [0, 1].map(|person| {
+            let active = tracker.people.iter().find(|active| active.person == person).unwrap();
+            (active.of_its_own.len(), active.of_its_own.last().copied())
+        })
+    };
+    assert_eq!(noted(&mut tracker, &seen), [(0, None), (1, Some(0.0))]);
+    seen.firm_mask = Image::filled(SIZE[0], SIZE[1], true);
+    seen.frame = 41;
+    let [front, behind] = noted(&mut tracker, &seen);
+    assert!(front == (0, None) && behind.1 > Some(0.5), "{behind:?}");
+}
+
 #[test]
 fn who_is_back_has_the_height_of_before() {
     let [first, second] = [(0, BodyHeight::given(1.75)), (1, BodyHeight::given(1.6))];

@@ -4,11 +4,13 @@ use super::super::super::decisions::{
     FIT_PLACE_SD, HEIGHT_MODEL_SD_M, MODEL_SD_RAD, MOST_SD_RAD, OFF_ACROSS_SD_M, OFF_SD_RAD, SD_FACTOR,
     ZERO_BLUR_PX, ZERO_SD,
 };
+use super::super::belt::{self, Belt};
+use super::super::contacts::{self, Feet};
 use super::super::unknowns::{
     self, ANGLES, FRAME, FRAME_ALONG, FRAME_HEIGHT, FRAME_PHASE, JOINTS, Prior, STATURE, TORSO, Unknowns,
     WHOLE, WHOLE_ACROSS, WHOLE_BEND, WHOLE_HEADING, WHOLE_LEAN, body, posture, slopes,
 };
-use super::super::{FitQuality, FittedFrame, Measured, PartQuality, WalkFit, belt, contacts};
+use super::super::{FitQuality, FittedFrame, Measured, PartQuality, WalkFit};
 use super::{Fitted, Problem};
 use crate::estimate::arrow::Covariance;
 use crate::estimate::median::median;
@@ -86,16 +88,17 @@ impl Problem<'_> {
                 measured: self.measured(fitted, covariance, k),
                 sd: self.place_sd(fitted, covariance, k),
             };
-            (frame, [0, 1].map(|side| [-1.0, 1.0].map(|end| figure.sole(side, end))))
+            (frame, figure.feet())
         };
-        let (mut all, mut feet): (Vec<FittedFrame>, Vec<_>) =
+        let (mut all, feet): (Vec<FittedFrame>, Vec<_>) =
             (0..frames.len()).into_par_iter().map(frame).unzip();
-        let times_s: Vec<f64> = self.frames.iter().map(|f| f.time_s).collect();
-        let phases: Vec<f64> = all.iter().map(|f| f.phase).collect();
-        let ahead: Vec<DVec2> = all.iter().map(|f| DVec2::from_angle(f.heading_rad)).collect();
-        let sight = self.origin - self.camera.position().truncate();
-        let belt = || belt::belt(&times_s, &phases, &feet, ahead[0], sight);
-        let belt = self.is_on_treadmill.then(belt).flatten();
+        // The speed of the belt is that of the feet in the frames, contacts lie between these.
+        let belt = self.is_on_treadmill.then(|| self.belt(&all, &feet)).flatten();
+        let (times_s, between) = contacts::between(&self.times_s(), frames);
+        let phases: Vec<f64> = between.iter().map(|frame| frame[FRAME_PHASE]).collect();
+        let figure = |frame: &[f64; FRAME]| self.figure_of(whole, frame);
+        let (mut feet, ahead): (Vec<_>, Vec<DVec2>) =
+            between.par_iter().map(figure).map(|figure| (figure.feet(), figure.ahead)).unzip();
         if let Some(belt) = belt {
             belt::move_with(&mut feet, &times_s, ahead[0] * belt.speed_mps);
         }
@@ -116,6 +119,16 @@ impl Problem<'_> {
             belt,
             quality,
         }
+    }
+
+    fn times_s(&self) -> Vec<f64> {
+        self.frames.iter().map(|frame| frame.time_s).collect()
+    }
+
+    fn belt(&self, frames: &[FittedFrame], feet: &[Feet]) -> Option<Belt> {
+        let phases: Vec<f64> = frames.iter().map(|f| f.phase).collect();
+        let sight = self.origin - self.camera.position().truncate();
+        belt::belt(&self.times_s(), &phases, feet, DVec2::from_angle(frames[0].heading_rad), sight)
     }
 
     /// The body height without the prior of the excess, which is taken out as it was put in: with estimate x and
