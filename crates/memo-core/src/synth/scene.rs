@@ -285,9 +285,14 @@ impl SynthScene {
 
     /// The rendered grey frame.
     pub fn frame(&self, frame: usize) -> Image<u8> {
+        self.frame_of(frame, self.truth(frame).map(|truth| truth.posed).as_ref())
+    }
+
+    /// The frame with another body, or without one.
+    pub(crate) fn frame_of(&self, frame: usize, posed: Option<&PosedBody>) -> Image<u8> {
         let mut levels = self.background.clone();
-        if let Some(truth) = self.truth(frame) {
-            self.draw(&truth.posed, &mut levels);
+        if let Some(posed) = posed {
+            self.draw(posed, &mut levels);
         }
         let random = Random::new(
             self.options.seed ^ (frame as u64).wrapping_add(1).wrapping_mul(0x9E37_79B9_7F4A_7C15),

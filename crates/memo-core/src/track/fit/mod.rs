@@ -9,7 +9,8 @@
 //!    (`edge_search`).
 //! 3. A Gauss-Newton step moves all unknowns at once; large distances count less (Geman and McClure). Distances that
 //!    count become smaller from step to step.
-//! 4. The first steps are made from several gaits; the one whose contours are nearest goes on.
+//! 4. The first steps are made from several gaits; the one whose contours are nearest to a few of the frames, once its
+//!    curves are fitted, goes on.
 //! 5. The joint curves are fitted first, then what each frame deviates from them.
 //! 6. The steps after the first ones are made again with left and right exchanged, of a person whom others hide in part the
 //!    first ones too, and the evidence decides (`sides`).

@@ -39,6 +39,10 @@ fn far_edges_cost_at_most_one_and_weigh_as_their_cost_rises() {
     }
 }
 
+fn scene(frames: usize) -> SceneOptions {
+    SceneOptions { seed: 3, frames, empty_frames: 4, noise_sd: 1.0, ..SceneOptions::default() }
+}
+
 /// A walker drawn by the model, and the frames in which the fit finds it at the true places and phases.
 struct Drawn {
     camera: Camera,
@@ -48,9 +52,11 @@ struct Drawn {
 }
 
 fn drawn() -> Drawn {
-    let options =
-        SceneOptions { seed: 3, frames: 24, empty_frames: 4, noise_sd: 1.0, ..SceneOptions::default() };
-    let scene = SynthScene::new(options).unwrap();
+    drawn_for(24)
+}
+
+fn drawn_for(frames: usize) -> Drawn {
+    let scene = SynthScene::new(scene(frames)).unwrap();
     let background = scene.frame(0);
     let frame = |truth: Truth| {
         let half_torso_m = 0.5 * scene.walker.body.torso_length_m();
@@ -68,8 +74,60 @@ fn drawn() -> Drawn {
             start: Hypothesis { height_m, ..truth.hypothesis },
         }
     };
-    let frames = (0..scene.len()).filter_map(|k| scene.truth(k)).map(frame).collect();
+    let mut frames: Vec<FitFrame> = (0..scene.len()).filter_map(|k| scene.truth(k)).map(frame).collect();
+    for k in 1..frames.len() {
+        let step = (frames[k].start.phase - frames[k - 1].start.phase).rem_euclid(1.0);
+        frames[k].start.phase = frames[k - 1].start.phase + step;
+    }
     Drawn { camera: scene.camera, walker: scene.walker, route: scene.path.into(), frames }
+}
+
+/// Frames enough for a step of either leg.
+const TWO_STEPS: usize = 44;
+
+/// The frames of somebody with the mean joint curves of people, but for a knee, of the side 0 or 1, whose flexion is smaller
+/// by a share.
+fn with_a_stiff_knee(side: usize, share: f64) -> Drawn {
+    let mut drawn = drawn_for(TWO_STEPS);
+    let scene = SynthScene::new(scene(TWO_STEPS)).unwrap();
+    let background = scene.frame(0);
+    let options = FitOptions::default();
+    let pictures: Vec<Image<u8>> = {
+        let problem = Problem::new(&drawn.camera, &drawn.walker, &drawn.route, &drawn.frames, &options);
+        let mut unknowns = problem.start(0.0);
+        flatten(&drawn.walker.gait, &mut unknowns.whole, 1, side, share);
+        let shown = (0..scene.len()).filter(|&k| scene.truth(k).is_some()).enumerate();
+        shown.map(|(n, k)| scene.frame_of(k, Some(&problem.figure(&unknowns, n).posed))).collect()
+    };
+    for (frame, picture) in drawn.frames.iter_mut().zip(&pictures) {
+        frame.view.pixels = View::paired(picture, |y| background.row(y));
+    }
+    drawn
+}
+
+/// The fit starts from the average gait or from a stiff knee of the right side, and finds how the knee moves.
+#[test]
+fn a_stiff_knee_is_measured() {
+    for (side, share) in [(0, 0.0), (0, 0.7), (1, 0.5), (1, 0.7)] {
+        let Drawn { camera, walker, route, frames } = with_a_stiff_knee(side, share);
+        let options = FitOptions::default();
+        let problem = Problem::new(&camera, &walker, &route, &frames, &options);
+        let (start, gait) = problem.best_start(0.0).unwrap();
+        let is_stiff = gait == StartGait::StiffKnee(side);
+        assert!(gait == StartGait::Average || share > 0.0 && is_stiff, "{side} {share}: {gait:?}");
+        let fitted = problem.finished(start).unwrap().unknowns;
+        let mut drawn = problem.start(0.0);
+        flatten(&walker.gait, &mut drawn.whole, 1, side, share);
+        let knees = |unknowns: &Unknowns, k: usize| {
+            let posture = posture(&walker.gait, &unknowns.whole, &unknowns.frames[k]);
+            [posture.right.knee, posture.left.knee]
+        };
+        let off =
+            |k: usize| knees(&fitted, k).into_iter().zip(knees(&drawn, k)).map(|(a, b)| (a - b).powi(2));
+        let squares: f64 = (0..frames.len()).flat_map(off).sum();
+        let rms_deg = (squares / (2 * frames.len()) as f64).sqrt().to_degrees();
+        assert!(rms_deg < 1.5, "{side} {share}: {rms_deg}");
+    }
 }
 
 /// What the contours say about the place along the path when the model stands beside the person.
