@@ -158,7 +158,8 @@ struct Line<'a> {
 }
 
 impl<'a> Line<'a> {
-    /// `None` for contours that are not compared, and for those that the camera does not see as lines.
+    /// `None` for contours that are not compared, and for those that the camera does not see as lines. A fit that goes astray
+    /// may pass close to the camera, where lines grow without limit: those longer than the picture are not compared either.
     fn new(
         segment: &VisibleSegment,
         part: Part,
@@ -175,6 +176,10 @@ impl<'a> Line<'a> {
         let ends = [segment.start, segment.end].map(|end| camera.project(line.on_surface(end).0));
         let across = ends[1]? - ends[0]?;
         line.length_px = across.length();
+        let [width, height] = camera.size.map(f64::from);
+        if line.length_px > width.hypot(height) {
+            return None;
+        }
         let axis = cylinder.world_from_cylinder.matrix3.z_axis;
         let middle = segment.start.midpoint(segment.end);
         let outwards = match segment.kind {

@@ -178,6 +178,29 @@ fn the_crown_of_the_changes_draws_the_head_to_it() {
     assert!(below < 0.0 && above > 0.0 && farther > 2.0 * above, "{below} {above} {farther}");
 }
 
+/// A step may throw the person in front of the lens, where contours are as long as one likes.
+#[test]
+fn a_body_close_to_the_camera_has_no_more_samples_than_the_picture_has_room_for() {
+    let Drawn { camera, walker, route, frames } = drawn();
+    let options = FitOptions::default();
+    let problem = Problem::new(&camera, &walker, &route, &frames, &options);
+    let mut unknowns = problem.start(0.0);
+    let width = problem.last_start_width(&unknowns).unwrap();
+    let ahead = DVec2::from_angle(problem.route_heading_rad());
+    let to_eye = (camera.position() - problem.figure(&unknowns, 10).pelvis).truncate();
+    unknowns.frames[10][FRAME_ALONG] += to_eye.dot(ahead);
+    // Both sides of each part, from end to end of the picture.
+    let [columns, rows] = camera.size.map(f64::from);
+    let most = 2.0 * 14.0 * columns.hypot(rows) / width.spacing_px();
+    let mut work = Workspace::default();
+    for mm in -400..400 {
+        unknowns.whole[WHOLE_ACROSS] = to_eye.dot(ahead.perp()) + 0.001 * f64::from(mm);
+        let figure = problem.figure(&unknowns, 10);
+        samples(&figure, &[], &camera, &unknowns.whole, width.spacing_px(), &mut work);
+        assert!(work.samples.len() as f64 <= most, "{mm} mm: {}", work.samples.len());
+    }
+}
+
 /// A place that no contour shows is where the places before and after say.
 #[test]
 fn places_and_phases_change_their_speed_little_from_frame_to_frame() {
