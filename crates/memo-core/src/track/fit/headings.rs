@@ -9,7 +9,7 @@
 use super::problem::{Fitted, Problem};
 use super::seen::Seen;
 use super::unknowns::Unknowns;
-use super::{FitError, LEAST_FRAMES, MirroredHeading, WalkFit};
+use super::{FitError, MirroredHeading, WalkFit};
 use std::f64::consts::TAU;
 
 /// Headings that are nearer to each other are one, radians.
@@ -100,10 +100,7 @@ fn choices<'p, 'a>(
     mirrored: &'p Problem<'a>,
     are_all: bool,
 ) -> Result<Vec<Choice<'p, 'a>>, FitError> {
-    if problem.frame_count() < LEAST_FRAMES {
-        return Err(FitError::TooFewFrames { got: problem.frame_count() });
-    }
-    let (start, gait) = problem.best_start(0.0).ok_or(FitError::Undetermined)?;
+    let (start, gait) = problem.best_start(0.0)?;
     let there = mirrored.started(0.5, gait.mirrored()).map(|(_, start)| start);
     let exchanged = |start: &Unknowns| are_all.then(|| start.exchanged());
     let starts = [

@@ -9,6 +9,7 @@ use super::super::steady;
 use super::super::walk::{Step, Walk};
 use super::contacts::Contact;
 use super::edge_search::View;
+use super::problem::StartGait;
 use super::views::{Backdrop, Piece};
 use super::{
     FitError, FitFrame, FitOptions, FitVerdict, FittedFrame, Problem, WalkFit, fit_on_the_spot, fitted_route,
@@ -107,18 +108,19 @@ impl Tracked<'_> {
         options: &FitOptions,
         p_swapped: Option<f64>,
     ) -> Result<WalkFit, FitError> {
-        let problem = || self.problem(route, frames, options);
-        let fit = problem().fit(p_swapped)?;
-        Ok(if p_swapped.is_some() { self.with_height_of_its_own(fit, problem()) } else { fit })
+        let problem = self.problem(route, frames, options);
+        let gait = problem.start_gait(0.0)?;
+        let fit = problem.fit(gait, p_swapped)?;
+        Ok(if p_swapped.is_some() { self.with_height_of_its_own(fit, problem, gait) } else { fit })
     }
 
     /// The same with the height that the picture shows if the given one is far from it: the fit near the given height
     /// tells that it is wrong, but not by how much.
-    fn with_height_of_its_own(&self, fit: WalkFit, problem: Problem<'_>) -> WalkFit {
+    fn with_height_of_its_own(&self, fit: WalkFit, problem: Problem<'_>, gait: StartGait) -> WalkFit {
         let is_given = self.height.source == HeightSource::Given && self.tilt.is_none();
         let is_off = fit.quality.verdict() != FitVerdict::Well
             || fit.height.is_some_and(|seen| self.height.contradicts(&seen));
-        let height = || problem.of_height(&BodyHeight::POPULATION).fit(None).ok()?.height;
+        let height = || problem.of_height(&BodyHeight::POPULATION).fit(gait, None).ok()?.height;
         match (is_given && is_off).then(height).flatten() {
             Some(seen) => WalkFit { height: Some(seen), ..fit },
             None => fit,

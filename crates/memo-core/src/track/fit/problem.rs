@@ -62,7 +62,7 @@ pub(crate) struct Problem<'a> {
 
 /// A gait from which the fit starts. People who walk unlike the average are not always reached from it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum StartGait {
+pub enum StartGait {
     Average,
     /// [`GaitStyle::CROUCHED`].
     Crouched,
@@ -73,7 +73,7 @@ pub(super) enum StartGait {
 impl StartGait {
     const ALL: [Self; 4] = [Self::Average, Self::Crouched, Self::StiffKnee(0), Self::StiffKnee(1)];
 
-    pub(super) fn mirrored(self) -> Self {
+    pub fn mirrored(self) -> Self {
         match self {
             Self::StiffKnee(side) => Self::StiffKnee(1 - side),
             same => same,
@@ -222,17 +222,14 @@ impl<'a> Problem<'a> {
         sides::p_other(&chosen.seen, &other.seen, p_tracked, self.visible_share)
     }
 
-    /// Fits the person, steps 1 to 7 of the module. `p_tracked_swapped` is the probability by the tracker that the
-    /// sides are exchanged; without it, the sides stay as tracked.
-    pub fn fit(&self, p_tracked_swapped: Option<f64>) -> Result<WalkFit, FitError> {
-        if self.frames.len() < LEAST_FRAMES {
-            return Err(FitError::TooFewFrames { got: self.frames.len() });
-        }
-        let (start, _) = self.best_start(0.0).ok_or(FitError::Undetermined)?;
+    /// Fits the person from a gait, steps 1 to 7 of the module. `p_tracked_swapped` is the probability by the tracker that
+    /// the sides are exchanged; without it, the sides stay as tracked.
+    pub fn fit(&self, gait: StartGait, p_tracked_swapped: Option<f64>) -> Result<WalkFit, FitError> {
+        let (_, start) = self.started(0.0, gait).ok_or(FitError::Undetermined)?;
         // What is hidden holds no fit in place, so one with exchanged sides then takes first steps of its own.
         let is_hidden = self.visible_share < SEEN_SHARE;
         let exchanged = p_tracked_swapped.and_then(|_| match is_hidden {
-            true => self.best_start(0.5).map(|(start, _)| start),
+            true => self.best_start(0.5).ok().map(|(start, _)| start),
             false => Some(start.exchanged()),
         });
         let (as_tracked, exchanged) =
@@ -258,10 +255,6 @@ impl<'a> Problem<'a> {
         Ok(self.result(fitted, p_swapped, quality))
     }
 
-    pub(super) fn frame_count(&self) -> usize {
-        self.frames.len()
-    }
-
     pub(super) fn route_heading_rad(&self) -> f64 {
         self.route.at(self.origin_along_m).heading_rad
     }
@@ -270,9 +263,18 @@ impl<'a> Problem<'a> {
         self.heading_at(&fitted.unknowns.whole, self.origin_along_m)
     }
 
-    /// The first steps from the gait with which a few of the frames come nearest to their edges once the person's curves are
-    /// fitted, with the tracker's phase shifted by some cycles.
-    pub(super) fn best_start(&self, phase: f64) -> Option<(Unknowns, StartGait)> {
+    /// The first steps from the best gait to start from, with the tracker's phase shifted by some cycles.
+    pub(super) fn best_start(&self, phase: f64) -> Result<(Unknowns, StartGait), FitError> {
+        let gait = self.start_gait(phase)?;
+        let (_, start) = self.started(phase, gait).ok_or(FitError::Undetermined)?;
+        Ok((start, gait))
+    }
+
+    /// The gait from which a few of the frames come nearest to their edges once the person's curves are fitted.
+    pub fn start_gait(&self, phase: f64) -> Result<StartGait, FitError> {
+        if self.frames.len() < LEAST_FRAMES {
+            return Err(FitError::TooFewFrames { got: self.frames.len() });
+        }
         // 1. The first steps from every gait. What is far off after them stays so.
         let few = self.of_few_frames();
         let started: Vec<_> = StartGait::ALL
@@ -286,8 +288,8 @@ impl<'a> Problem<'a> {
             .filter(|(cost, ..)| *cost <= MOST_START_COST * least)
             .filter_map(|(_, unknowns, gait)| Some((few.curves_cost(unknowns)? * gait.handicap(), gait)))
             .collect();
-        let (_, gait) = costs.into_iter().min_by(|a, b| a.0.total_cmp(&b.0))?;
-        Some((self.started(phase, gait)?.1, gait))
+        let best = costs.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
+        best.map(|(_, gait)| gait).ok_or(FitError::Undetermined)
     }
 
     /// The same with every second, third ... frame, so that there are at most [`FEW_FRAMES`], but at least one in [`FEW_S`].

@@ -149,7 +149,7 @@ impl Problem<'_> {
     /// The route after one step in which body and curves are held; `None` if the contours do not determine one.
     fn moved_route(&self, ends_m: [f64; 2]) -> Option<Route> {
         let bend = self.bend()?;
-        let (mut unknowns, _) = self.best_start(0.0)?;
+        let (mut unknowns, _) = self.best_start(0.0).ok()?;
         let width = self.last_start_width(&unknowns)?;
         // 1. The normal equations of the coefficients.
         let terms: Vec<_> = (0..unknowns.frames.len())

@@ -23,7 +23,9 @@ fn a_short_walk_and_an_empty_picture_are_no_person() {
     };
     let fit = |count: usize| {
         let frames: Vec<FitFrame> = (0..count).map(frame).collect();
-        Problem::new(&camera, &walker, &path.into(), &frames, &options).fit(Some(0.1))
+        let route = path.into();
+        let problem = Problem::new(&camera, &walker, &route, &frames, &options);
+        problem.fit(problem.start_gait(0.0)?, Some(0.1))
     };
     assert_eq!(fit(14), Err(FitError::TooFewFrames { got: 14 }));
     assert_eq!(fit(15), Err(FitError::Undetermined));
