@@ -41,8 +41,11 @@ const OFFSETS: usize = 25;
 /// Changes show feet while they move: in front, a foot goes out of sight soon after it has landed, and behind, it comes
 /// into sight only when it is lifted. Measured on people drawn by two programs: 0.11 to 0.15, and -0.10 to -0.21.
 const LEAD: [f64; 2] = [0.12, -0.15];
-/// All changes reach so much farther down than the firm ones, pixels.
-const ALL_MARGIN_PX: f64 = 2.0;
+/// The lowest changes of who goes away are nearer to the camera than the ankle, by so many lengths of the foot. Measured on
+/// people drawn by two programs: in the mean of a walk, 24 of four people are -0.07 to 0.13 m off along the path, and ten of five
+/// others -0.09 to 0.03 m. Of who comes nearer, 17 are -0.16 to -0.02 m off and nine of the others 0.17 to 0.33 m, so nothing
+/// is added.
+const SHOE: f64 = 1.25;
 /// How far the feet of walkers are off their line of phase, the scale of Cauchy's distribution, metres. Things that are no
 /// walkers may be off even motion by any of `SCALES_M`.
 const WALKERS_OFF_M: f64 = 0.06;
@@ -149,10 +152,9 @@ impl Reach {
         }
         let along_m = node as f64 * NODE_M;
         let path = self.route.at(along_m);
-        // The shoe of who goes away reaches farther towards the camera than the ankle.
-        let half_m = 0.5 * self.walker.body.proportions.foot * self.walker.body.height_m;
-        let [lead, shoe_m] =
-            if comes_nearer(&path, along_m, &self.camera) { [LEAD[0], 0.0] } else { [LEAD[1], -half_m] };
+        let foot_m = self.walker.body.proportions.foot * self.walker.body.height_m;
+        let comes_nearer = comes_nearer(&path, along_m, &self.camera);
+        let [lead, shoe_m] = if comes_nearer { [LEAD[0], 0.0] } else { [LEAD[1], -SHOE * foot_m] };
         let values = std::array::from_fn(|k| {
             let phase = k as f64 / PHASES as f64 + lead;
             // Both sides have the same curve, half a cycle apart.
@@ -177,11 +179,6 @@ impl Reach {
     }
 }
 
-/// How far changes reach below the feet, pixels.
-fn margin_px(by_all: bool) -> f64 {
-    MASK_MARGIN_PX + if by_all { ALL_MARGIN_PX } else { 0.0 }
-}
-
 impl Feet {
     /// Metres on the ground per pixel of the lowest row.
     fn row_m(&self) -> f64 {
@@ -190,9 +187,9 @@ impl Feet {
 }
 
 /// Where the lowest changes of a rectangle lie on the ground, and one pixel farther up; `None` above the horizon.
-fn feet(sighting: &Sighting, margin_px: f64, camera: &Camera) -> Option<Feet> {
+fn feet(sighting: &Sighting, camera: &Camera) -> Option<Feet> {
     let r = &sighting.rectangle;
-    let (middle, bottom) = (0.5 * (r.left + r.right) as f64, r.bottom as f64 - margin_px);
+    let (middle, bottom) = (0.5 * (r.left + r.right) as f64, r.bottom as f64 - MASK_MARGIN_PX);
     let on_ground = |row: f64| {
         let pixel = DVec2::new(middle, row);
         camera.ground_point(camera.undistort(pixel).ok()?).map(DVec3::truncate)
@@ -270,10 +267,8 @@ impl Frontal {
         rates: &CadenceRange,
     ) -> Option<(f64, Self, Line)> {
         // 1. The path.
-        let seen: Vec<(f64, DVec2)> = sightings
-            .iter()
-            .filter_map(|s| Some((s.time_s, feet(s, margin_px(by_all), camera)?.place)))
-            .collect();
+        let seen: Vec<(f64, DVec2)> =
+            sightings.iter().filter_map(|s| Some((s.time_s, feet(s, camera)?.place))).collect();
         let (path, speed_mps) = path_through(&seen)?;
         let is_along = off_the_sight_rad(&path, 0.0, camera) < ALONG_THE_SIGHT_RAD;
         if !(SLOWEST_MPS..FASTEST_MPS).contains(&speed_mps) || !is_along {
@@ -297,7 +292,7 @@ impl Frontal {
     fn feet_of(&self, seen: &Lowest, along_m: f64) -> Option<Feet> {
         let camera = &self.reach.camera;
         let by_all = self.by_all[usize::from(comes_nearer(&self.route.at(along_m), along_m, camera))];
-        feet(&if by_all { seen.all } else { seen.firm }?, margin_px(by_all), camera)
+        feet(&if by_all { seen.all } else { seen.firm }?, camera)
     }
 
     /// The same walk on the line through the feet of all frames, with the variances of place and phase.
@@ -589,18 +584,18 @@ fn likelihood(off_m: &[f64], scale_m: f64) -> f64 {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::super::decisions::HINDSIGHT_GAIN;
     use super::super::search::tests::{camera, walker};
     use super::super::walk::FrameEdges;
     use super::*;
     use crate::image::Rectangle;
 
-    const FRAME_S: f64 = 0.04;
+    pub const FRAME_S: f64 = 0.04;
     const STEP_S: f64 = 0.5;
-    const SPEED_MPS: f64 = 1.2;
+    pub const SPEED_MPS: f64 = 1.2;
     /// The middle of the picture, and where the walk is half-way through it.
-    const MIDDLE: DVec2 = DVec2::new(0.0, 0.0);
+    pub const MIDDLE: DVec2 = DVec2::new(0.0, 0.0);
 
     /// A frame in which the lowest changes are at a point of the ground.
     fn frame(k: usize, place: DVec2) -> (Option<Sighting>, FrameEdges) {
@@ -612,19 +607,19 @@ mod tests {
         (Some(Sighting { time_s, rectangle }), edges)
     }
 
-    fn standing(count: usize, foot: impl Fn(f64) -> DVec2) -> Standing {
+    pub fn standing(count: usize, foot: impl Fn(f64) -> DVec2) -> Standing {
         let kept = (0..count).map(|k| frame(k, foot(FRAME_S * k as f64))).collect();
         Standing { kept, ..Standing::default() }
     }
 
     /// Towards the camera, which looks along the y axis.
-    fn towards() -> DVec2 {
+    pub fn towards() -> DVec2 {
         (camera().position().truncate() - MIDDLE).normalize()
     }
 
     /// The nearer foot of a model that walks evenly, seen `LEAD` too early: the right heel strikes at 0, the left one a step
     /// later. The picture is rendered and seen elsewhere, in the clothed walks.
-    fn feet_of_steps(time_s: f64) -> DVec2 {
+    pub fn feet_of_steps(time_s: f64) -> DVec2 {
         let walker = walker();
         let phase = 0.5 * time_s / STEP_S + LEAD[0];
         let along_m = SPEED_MPS * time_s - 1.2;

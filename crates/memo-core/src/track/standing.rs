@@ -73,14 +73,20 @@ impl Standing {
         if is_left { Self::default() } else { self }
     }
 
-    /// The frames of a walk, and those before and in between that the walk does not have.
-    pub(super) fn followed_by(mut self, kept: &[(Option<Sighting>, FrameEdges)], pieces: &[Piece]) -> Self {
+    /// The frames of a walk with their pieces and feet, and those before and in between that the walk does not have.
+    pub(super) fn followed_by(
+        mut self,
+        kept: &[(Option<Sighting>, FrameEdges)],
+        pieces: &[Piece],
+        feet: &BTreeMap<usize, Sighting>,
+    ) -> Self {
         let last = kept.last().map_or(usize::MAX, |(_, edges)| edges.frame);
         let is_new = |frame: usize| frame < last && kept.iter().all(|(_, edges)| edges.frame != frame);
         self.kept.retain(|(_, edges)| is_new(edges.frame));
         self.pieces.retain(|piece| is_new(piece.frame));
         self.kept.extend_from_slice(kept);
         self.pieces.extend_from_slice(pieces);
+        self.feet.extend(feet);
         self.kept.sort_by_key(|(_, edges)| edges.frame);
         self.pieces.sort_by_key(|piece| piece.frame);
         self

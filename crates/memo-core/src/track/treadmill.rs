@@ -360,7 +360,7 @@ mod tests {
             standing.with(Some(seen), None, edges(k), None)
         });
         let walk: Vec<_> = (2..6).map(|k| (None, edges(k))).collect();
-        let all = before.followed_by(&walk, &[]);
+        let all = before.followed_by(&walk, &[], &Default::default());
         let frames = |standing: &Standing| standing.kept.iter().map(|(_, e)| e.frame).collect::<Vec<_>>();
         assert_eq!(frames(&all), [0, 1, 2, 3, 4, 5]);
         assert_eq!(frames(&all.later(4)), [4, 5]);

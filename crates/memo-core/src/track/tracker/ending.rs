@@ -75,7 +75,7 @@ impl Tracker {
     /// 2. The person, fitted to all of them.
     /// 3. What is no walk, or a second model of somebody else, or has no legs of its own, is withdrawn.
     pub(super) fn end_walk(&mut self, active: Active) {
-        let mut active = if active.settled { active } else { self.begun_on_the_spot(active) };
+        let mut active = if active.settled { active } else { self.begun_otherwise(active) };
         let standing = self.complete(&mut active);
         let walk_boxes = walk_boxes(&active);
         if !active.is_walk() {

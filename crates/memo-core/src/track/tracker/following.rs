@@ -159,7 +159,7 @@ impl Tracker {
         }
         if self.people.len() == 1 {
             let active = self.people.remove(k);
-            let active = self.begun_on_the_spot(active);
+            let active = self.begun_otherwise(active);
             self.people.insert(k, active);
         }
         self.people[k].settle(&self.backdrop, &self.options);

@@ -46,7 +46,12 @@ impl Tracker {
         let size = [evidence.grey.width() as u32, evidence.grey.height() as u32];
         let standing = std::mem::take(&mut self.standing);
         let begun = self.begun_where_it_stays(standing, size);
-        match begun.or_else(|standing| self.begun_along_the_sight(standing, size)) {
+        let along_the_sight = |standing| {
+            self.begun_with_a_height(standing, |standing, person| {
+                self.begun_along_the_sight(standing, size, person)
+            })
+        };
+        match begun.or_else(along_the_sight) {
             Ok(mut active) => {
                 self.candidates.clear();
                 match self.gone_on(&active) {
@@ -87,8 +92,14 @@ impl Tracker {
         back.map_or_else(|| begin(standing, self.identities.count()), Ok)
     }
 
-    /// Only a calibrated camera shows how far away feet are.
-    fn begun_along_the_sight(&self, standing: Standing, size: [u32; 2]) -> Result<Active, Standing> {
+    /// A walk towards the camera or away from it, with the height of this person. Only a calibrated camera shows how far away
+    /// feet are.
+    fn begun_along_the_sight(
+        &self,
+        standing: Standing,
+        size: [u32; 2],
+        person: usize,
+    ) -> Result<Active, Standing> {
         let (options, sightings) = (&self.options, standing.sightings());
         let Some(camera) = options.camera.as_ref().filter(|_| options.treadmill != Some(true)) else {
             return Err(standing);
@@ -96,13 +107,11 @@ impl Tracker {
         if feet_cut_off(&sightings, size[1] as usize) || standing.lasts_s() < SHORTEST_S {
             return Err(standing);
         }
-        self.begun_with_a_height(standing, |standing, person| {
-            let height = approaching_height(options, self.given_height(person), camera, &sightings);
-            match options.walker(height.height_m, COMFORTABLE_MPS) {
-                Ok(walker) => Approach { camera, height, walker, options }.begin(standing),
-                Err(_) => Err(standing),
-            }
-        })
+        let height = approaching_height(options, self.given_height(person), camera, &sightings);
+        match options.walker(height.height_m, COMFORTABLE_MPS) {
+            Ok(walker) => Approach { camera, height, walker, options }.begin(standing),
+            Err(_) => Err(standing),
+        }
     }
 
     /// What a start of a person on the spot needs.
@@ -130,19 +139,26 @@ impl Tracker {
         Some(Spot { camera, tilt, courses, height, walker, backdrop, options })
     }
 
-    /// A walk that was taken for a slow one but stays where it is begins again on the spot.
-    pub(super) fn begun_on_the_spot(&mut self, active: Active) -> Active {
-        if self.options.treadmill == Some(false) || active.is_on_treadmill || active.moves_on() {
+    /// What was taken for a walk across the picture begins again if it stays where it is and walks on the spot, or if its
+    /// feet go along the line of sight.
+    pub(super) fn begun_otherwise(&mut self, active: Active) -> Active {
+        if active.is_on_treadmill || active.frontal.is_some() {
             return active;
         }
-        let standing = std::mem::take(&mut self.standing).followed_by(&active.kept, &active.pieces);
+        let standing = self.standing.clone().followed_by(&active.kept, &active.pieces, &active.feet);
         if standing.kept.len() < self.options.path_frames {
             return active;
         }
-        let Active { person, started_frame, .. } = active;
-        match self.spot(&standing.sightings(), active.camera.size, person).map(|spot| spot.begin(standing)) {
-            Some(Ok(on_the_spot)) => Active { person, started_frame, ..on_the_spot },
-            _ => active,
+        let (size, person) = (active.camera.size, active.person);
+        let may_stay = self.options.treadmill != Some(false) && !active.moves_on();
+        let spot = may_stay.then(|| self.spot(&standing.sightings(), size, person)).flatten();
+        let begun = match spot {
+            Some(spot) => spot.begin(standing),
+            None => Err(standing),
+        };
+        match begun.or_else(|standing| self.begun_along_the_sight(standing, size, person)) {
+            Ok(begun) => Active { person, started_frame: active.started_frame, ..begun },
+            Err(_) => active,
         }
     }
 }

@@ -3,6 +3,7 @@
 use super::super::active::tests::active;
 use super::super::candidate::tests::seen_walking;
 use super::super::crowd::{body_box, clear_explained};
+use super::super::frontal::tests::{MIDDLE, SPEED_MPS, feet_of_steps, standing, towards};
 use super::super::height::BodyHeight;
 use super::super::people::Sign;
 use super::super::search::tests::{camera, rectangle_of, walker};
@@ -791,5 +792,26 @@ fn who_begins_again_on_the_spot_keeps_the_height() {
     for (who, height_m) in [(0, 1.75), (1, 1.6)] {
         let spot = tracker.spot(&sightings, [SIZE[0] as u32, SIZE[1] as u32], who).unwrap();
         assert_eq!(spot.height, BodyHeight::given(height_m));
+    }
+}
+
+/// What was begun across the picture, as arms and shadows may look, while its feet go along the line of sight or across it.
+#[test]
+fn a_walk_whose_feet_go_along_the_line_of_sight_begins_again_there() {
+    let across = |time_s: f64| MIDDLE + towards().perp() * (SPEED_MPS * time_s - 1.2);
+    for (seen, is_along) in [(standing(66, feet_of_steps), true), (standing(66, across), false)] {
+        let mut tracker = tracker();
+        let steps = (0..66).map(|k| step(k, 0.05 * k as f64, 1.2)).collect();
+        // The first frames are those from before the walk.
+        let (kept, feet) = (seen.kept[20..].to_vec(), seen.feet.clone());
+        tracker.standing = seen.before(20);
+        let walk = Active { kept, feet, person: 3, started_frame: Some(12), ..active(steps) };
+        let begun = tracker.begun_otherwise(walk);
+        assert_eq!((begun.person, begun.started_frame), (3, Some(12)));
+        assert_eq!(begun.is_frontal(), is_along);
+        if is_along {
+            assert_eq!(begun.kept.len(), 66);
+            assert!(begun.walk.route.at(0.0).direction().dot(towards()) > 0.99, "{:?}", begun.walk.route);
+        }
     }
 }
