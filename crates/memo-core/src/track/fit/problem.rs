@@ -496,7 +496,7 @@ impl<'a> Problem<'a> {
                 continue;
             }
             let clear = edge.strength / (edge.strength + CLEAR_STEP);
-            let weight = importance * near * clear / width.sd_px().powi(2);
+            let weight = importance * trust(sample) * near * clear / width.sd_px().powi(2);
             figure.motion(sample, motion);
             let n_j = gradient(self.camera, sample.world, sample.normal);
             terms.add(motion.iter().map(|(q, dx)| (*q, n_j.dot(*dx))), edge.offset_px, weight);
@@ -629,6 +629,20 @@ fn importance(sample: &Sample) -> f64 {
     let is_top_of_thigh = row == 5 && sample.z > 1.0 - 2.0 * 0.28;
     let of_limb = if (2..=4).contains(&row) { 0.3 } else { 1.0 };
     of_limb * if is_top_of_thigh { 0.3 * of_border } else { of_border }
+}
+
+/// What the edge at the lower border of a foot counts in a step: below it lies the shadow of the shoe, whose edges are as strong as
+/// the sole's. Which of two fits is nearer, both tell: there it counts like the rest of the foot.
+///
+/// Of 35 clips of four drawn people in clothes that hardly differ from the background, the distance from the camera was 22 cm off
+/// where it counted fully and 16 cm with a tenth (means), and in 28 clips, most in other clothes, 3 cm with either. There it was up
+/// to 14 cm off without the sole. With a quarter, hip and knee are as with a tenth.
+const SOLE: f64 = 0.1;
+
+/// What the edge of a sample counts in a step, of what it counts in the cost.
+fn trust(sample: &Sample) -> f64 {
+    let is_sole = sample.is_outer && row_of(sample.part) == 7 && sample.normal.y > 0.0;
+    if is_sole { SOLE } else { 1.0 }
 }
 
 /// The cost of an edge at a distance x, x² / (1 + x²), and the weight with which least squares lower it,

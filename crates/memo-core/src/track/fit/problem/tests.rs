@@ -248,6 +248,32 @@ fn contours_inside_the_body_and_of_shoes_count_less_than_the_outline() {
     assert_eq!([importance(&top), of(Part::LeftThigh, true)], [0.3, 1.0]);
 }
 
+/// Not its inner lines, and no other part.
+#[test]
+fn the_edge_of_a_sole_moves_the_person_less_than_the_rest_of_the_foot() {
+    let foot = |normal: DVec2, part: Part, is_outer: bool| Sample {
+        part,
+        point_px: DVec2::ZERO,
+        normal,
+        is_outer,
+        world: DVec3::ZERO,
+        radius: DVec3::Y,
+        z: 0.0,
+        taper: 0.0,
+    };
+    let sole = DVec2::new(0.3, 0.9).normalize();
+    assert_eq!(trust(&foot(sole, Part::LeftFoot, true)), 0.1);
+    for (normal, part, is_outer) in [
+        (-sole, Part::LeftFoot, true),
+        (DVec2::X, Part::RightFoot, true),
+        (sole, Part::RightFoot, false),
+        (sole, Part::RightShank, true),
+    ] {
+        let sample = foot(normal, part, is_outer);
+        assert_eq!(trust(&sample), 1.0, "{sample:?}");
+    }
+}
+
 /// Of a person of whom half is hidden, the same outlines are half of the evidence.
 #[test]
 fn the_sides_of_who_is_hidden_in_part_are_less_certain() {
