@@ -74,6 +74,11 @@ def test_version_and_help(memo_command):
     assert memo_command("track")[0] == 2
 
 
+def test_the_package_runs_as_a_module():
+    ran = subprocess.run([sys.executable, "-m", "memo", "--version"], capture_output=True, text=True)
+    assert (ran.returncode, ran.stdout, ran.stderr) == (0, f"memo {memo.__version__}\n", "")
+
+
 def every_command(group=None, context=None):
     """Each command of the command line by its words, such as `memo calibrate points`, with its context."""
     group = group or typer.main.get_command(cli._app())

@@ -591,7 +591,7 @@ pub(super) mod tests {
     use super::*;
     use crate::image::Rectangle;
 
-    pub const FRAME_S: f64 = 0.04;
+    const FRAME_S: f64 = 0.04;
     const STEP_S: f64 = 0.5;
     pub const SPEED_MPS: f64 = 1.2;
     /// The middle of the picture, and where the walk is half-way through it.

@@ -31,7 +31,8 @@ impl Standing {
         }
     }
 
-    /// These frames and the next; frames of something elsewhere, or of something that was gone, are dropped.
+    /// These frames and the next; frames of something elsewhere, or of something that was gone or followed meanwhile, are
+    /// dropped.
     pub(super) fn with(
         self,
         sighting: Option<Sighting>,
@@ -40,7 +41,9 @@ impl Standing {
         piece: Option<Piece>,
     ) -> Self {
         let is_there = |k: &(Option<Sighting>, FrameEdges)| k.0.is_some();
-        let is_gone = self.kept.iter().rev().take_while(|k| !is_there(k)).count() >= MISSED_FRAMES;
+        let missed = self.kept.iter().rev().take_while(|k| !is_there(k)).count();
+        let is_left = self.kept.last().is_some_and(|(_, last)| last.frame + MISSED_FRAMES < edges.frame);
+        let is_gone = missed >= MISSED_FRAMES || is_left;
         let is_elsewhere = self.kept.last().is_some_and(|(_, last)| last.window.gap(&edges.window) != [0, 0]);
         let mut standing = if is_gone || is_elsewhere { Self::default() } else { self };
         standing.feet.extend(feet.map(|feet| (edges.frame, feet)));
@@ -95,5 +98,31 @@ impl Standing {
     /// The rectangles.
     pub(super) fn sightings(&self) -> Vec<Sighting> {
         self.kept.iter().filter_map(|(sighting, _)| *sighting).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::active::tests::WINDOW;
+    use super::*;
+
+    /// The frames that are kept after these, each with the thing in it or not.
+    fn kept(frames: impl IntoIterator<Item = (usize, bool)>) -> Vec<usize> {
+        let sighting = Sighting { time_s: 0.0, rectangle: WINDOW };
+        let next = |standing: Standing, (frame, is_there): (usize, bool)| {
+            let edges = FrameEdges::of_one_alone(frame, 0.04 * frame as f64, WINDOW, Vec::new());
+            standing.with(is_there.then_some(sighting), None, edges, None)
+        };
+        let standing = frames.into_iter().fold(Standing::default(), next);
+        standing.kept.iter().map(|(_, edges)| edges.frame).collect()
+    }
+
+    #[test]
+    fn frames_from_before_a_gap_are_dropped() {
+        let there = |frames: std::ops::Range<usize>| frames.map(|frame| (frame, true));
+        assert_eq!(kept(there(0..3).chain(there(5..7))), [0, 1, 2, 5, 6]);
+        assert_eq!(kept(there(0..3).chain(there(6..8))), [6, 7], "a walk was followed meanwhile");
+        let gone = (3..6).map(|frame| (frame, false));
+        assert_eq!(kept(there(0..3).chain(gone).chain(there(6..8))), [6, 7], "the thing was gone");
     }
 }

@@ -1,4 +1,4 @@
-//! The tracker on somebody who walks on the spot, while nobody else is followed.
+//! The tracker on somebody who walks on the spot or along the line of sight, while nobody else is followed.
 
 use super::super::active::Active;
 use super::super::approach::Approach;
