@@ -262,7 +262,7 @@ fn the_edge_of_a_sole_moves_the_person_less_than_the_rest_of_the_foot() {
         taper: 0.0,
     };
     let sole = DVec2::new(0.3, 0.9).normalize();
-    assert_eq!(trust(&foot(sole, Part::LeftFoot, true)), 0.1);
+    assert_eq!(trust(&foot(sole, Part::LeftFoot, true)), 0.25);
     for (normal, part, is_outer) in [
         (-sole, Part::LeftFoot, true),
         (DVec2::X, Part::RightFoot, true),
