@@ -251,7 +251,7 @@ pub(in crate::track) const POSTURE_SD: f64 = 0.015;
 /// Standard deviation of a fitted contact, and of the errors that a person's initial contacts and toe-offs have in common,
 /// seconds: root mean squares over people. Single initial contacts of a side scatter by 9 ms and toe-offs by 12 in nine
 /// drawn people, initial contacts by 13 and 9 ms in two filmed ones. On average, initial contacts of seven drawn people are
-/// 5 ms early to 7 late, those of CMU12 20 and of one slow walker 32 early, and those of the two filmed people 36 and 43
+/// 5 ms early to 7 late, those of CMU12 20 and of one slow walker 32 early, and those of the two filmed people 34 and 43
 /// late. Toe-offs of three drawn people are within 10 ms, those of the two filmed ones 76 and 95 ms early: shoes bend at
 /// the toes, and the model's foot does not, so it leaves the ground when the heel rises. Not counted are the toe-offs of
 /// CMU12, whose toes move forward, back, and forward again.

@@ -29,7 +29,7 @@ const HEEL_SHARE: f64 = 0.4;
 const TOE_SHARE: f64 = 0.4;
 /// The initial contact is this much later, seconds: the median over nine drawn people, of seven of whom the fitted heel slows 26 to
 /// 38 ms before the true contact, of CMU12 53 and of one slow walker 65. In two videos of real people, whose contacts were marked
-/// by eye, it slows 3 and 10 ms after the contact, so contacts are 36 and 43 ms late there.
+/// by eye, it slows 1 and 10 ms after the contact, so contacts are 34 and 43 ms late there.
 const CONTACT_LATER_S: f64 = 0.033;
 /// Contacts lie this near to phase 0 of the side, toe-offs to the end of stance, cycles.
 const NEAR: f64 = 0.2;

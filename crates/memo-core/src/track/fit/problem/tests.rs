@@ -226,9 +226,9 @@ fn places_and_phases_change_their_speed_little_from_frame_to_frame() {
     }
 }
 
-#[test]
-fn contours_inside_the_body_and_of_shoes_count_less_than_the_outline() {
-    let sample = |part: Part, is_outer: bool| Sample {
+/// A sample of the upright side of a part.
+fn sample(part: Part, is_outer: bool) -> Sample {
+    Sample {
         part,
         point_px: DVec2::ZERO,
         normal: DVec2::X,
@@ -237,7 +237,11 @@ fn contours_inside_the_body_and_of_shoes_count_less_than_the_outline() {
         radius: DVec3::Y,
         z: 0.0,
         taper: 0.0,
-    };
+    }
+}
+
+#[test]
+fn contours_inside_the_body_and_of_shoes_count_less_than_the_outline() {
     let of = |part, is_outer| importance(&sample(part, is_outer));
     assert_eq!(of(Part::RightShank, true), 1.0);
     assert_eq!(of(Part::RightShank, false), 0.25);
@@ -248,29 +252,41 @@ fn contours_inside_the_body_and_of_shoes_count_less_than_the_outline() {
     assert_eq!([importance(&top), of(Part::LeftThigh, true)], [0.3, 1.0]);
 }
 
-/// Not its inner lines, and no other part.
+/// Not the instep, the toes, the inner lines of a foot and the lower borders of other parts.
 #[test]
-fn the_edge_of_a_sole_moves_the_person_less_than_the_rest_of_the_foot() {
-    let foot = |normal: DVec2, part: Part, is_outer: bool| Sample {
-        part,
-        point_px: DVec2::ZERO,
-        normal,
-        is_outer,
-        world: DVec3::ZERO,
-        radius: DVec3::Y,
-        z: 0.0,
-        taper: 0.0,
+fn the_lower_border_of_a_foot_is_a_sole() {
+    let below = DVec2::new(0.3, 0.9).normalize();
+    let of = |normal, part, is_outer| is_sole(&Sample { normal, ..sample(part, is_outer) });
+    for foot in [Part::LeftFoot, Part::RightFoot] {
+        assert!(of(below, foot, true));
+        assert!(!of(-below, foot, true) && !of(DVec2::X, foot, true) && !of(below, foot, false));
+    }
+    assert!(!of(below, Part::RightShank, true));
+}
+
+/// What soles say of the height of the person: in the last steps a tenth, and in the cost all of it.
+#[test]
+fn soles_move_the_person_less_in_the_last_steps() {
+    let Drawn { camera, walker, route, frames } = drawn();
+    let options = FitOptions::default();
+    let problem = Problem::new(&camera, &walker, &route, &frames, &options);
+    let mut unknowns = problem.start(0.0);
+    unknowns.whole.fill(0.0);
+    let height_px = problem.height_px(&unknowns).unwrap();
+    let said = |width: &Width| {
+        let (_, normal, _, seen) = problem.figure_terms(&unknowns, 10, width, &mut Room::default());
+        (normal[(HEIGHT, HEIGHT)], seen.cost)
     };
-    let sole = DVec2::new(0.3, 0.9).normalize();
-    assert_eq!(trust(&foot(sole, Part::LeftFoot, true)), 0.25);
-    for (normal, part, is_outer) in [
-        (-sole, Part::LeftFoot, true),
-        (DVec2::X, Part::RightFoot, true),
-        (sole, Part::RightFoot, false),
-        (sole, Part::RightShank, true),
-    ] {
-        let sample = foot(normal, part, is_outer);
-        assert_eq!(trust(&sample), 1.0, "{sample:?}");
+    let of_step = |n: usize, sole: Option<f64>| {
+        let width = Width::of_step(n, height_px);
+        said(&Width { sole: sole.unwrap_or(width.sole), ..width })
+    };
+    for (n, counts) in [(0, 1.0), (FRAMES_STEP - 1, 1.0), (FRAMES_STEP, SOLE), (11, SOLE)] {
+        let (now, cost) = of_step(n, None);
+        let ((with, _), (without, _)) = (of_step(n, Some(1.0)), of_step(n, Some(0.0)));
+        assert!(with > 1.01 * without, "{n}: soles say nothing, {with} {without}");
+        assert!((now - without - counts * (with - without)).abs() < 1e-6 * with, "{n}: {now}");
+        assert_eq!(cost, of_step(n, Some(0.0)).1, "{n}");
     }
 }
 
