@@ -16,41 +16,26 @@
 //! Both feet reach alike, so the phase is known up to half a cycle: left and right stay open. Only walking forwards is
 //! looked for.
 
+mod reach;
+mod rhythm;
+
 use super::decisions::{ALONG_THE_SIGHT_RAD, COMMON_ROW_SD_PX, FASTEST_MPS, FRONTAL_GAIN, SLOWEST_MPS};
-use super::locate::{MASK_MARGIN_PX, Sighting};
+use super::locate::Sighting;
 use super::route::Route;
-use super::search::{Hypothesis, Path};
+use super::search::Hypothesis;
 use super::standing::Standing;
 use super::start::CadenceRange;
 use super::walk::{Beginning, State, Walk};
 use crate::estimate::arrow::{Arrow, velocity_change};
 use crate::estimate::kalman::ConstantVelocity;
-use crate::estimate::line::line_through;
 use crate::model::{Camera, Walker};
-use glam::{DVec2, DVec3};
-use std::collections::BTreeMap;
+use glam::DVec2;
+use reach::{Feet, Reach, comes_nearer, feet};
+use rhythm::{Line, WALKERS_OFF_M, evenly, likelihood, path_through};
 
-/// Phases in the table of reaches.
-const PHASES: usize = 64;
-/// Distance of the places in the table of reaches, metres.
-const NODE_M: f64 = 0.5;
-/// Lines of phase that are compared at a start: cadences, and phases within half a cycle.
-const RATES: usize = 40;
-const OFFSETS: usize = 25;
-/// How much earlier in the cycle the nearer foot is seen than it stands there, of people who come nearer and who go away.
-/// Changes show feet while they move: in front, a foot goes out of sight soon after it has landed, and behind, it comes
-/// into sight only when it is lifted. Measured on people drawn by two programs: 0.11 to 0.15, and -0.10 to -0.21.
-const LEAD: [f64; 2] = [0.12, -0.15];
-/// The lowest changes of who goes away are nearer to the camera than the ankle, by so many lengths of the foot. Measured on
-/// people drawn by two programs: in the mean of a walk, 24 of four people are -0.07 to 0.13 m off along the path, and ten of five
-/// others -0.09 to 0.03 m. Of who comes nearer, 17 are -0.16 to -0.02 m off and nine of the others 0.17 to 0.33 m, so nothing
-/// is added.
-const SHOE: f64 = 1.25;
-/// How far the feet of walkers are off their line of phase, the scale of Cauchy's distribution, metres. Things that are no
-/// walkers may be off even motion by any of `SCALES_M`.
-const WALKERS_OFF_M: f64 = 0.06;
-const SCALES_M: [f64; 8] = [0.02, 0.035, 0.05, 0.075, 0.1, 0.15, 0.3, 0.6];
-/// Steps of the reweighted line and of Gauss and Newton's method.
+pub(super) use reach::off_the_sight_rad;
+
+/// Steps of Gauss and Newton's method.
 const STEPS: usize = 6;
 /// Standard deviation of the reach of people's feet about the model's, metres, and of the lowest row, pixels.
 const REACH_SD_M: f64 = 0.08;
@@ -72,13 +57,6 @@ const CADENCE_CHANGE_SD: f64 = 0.03;
 /// A live walk solves for so many last frames at a time; the first two of them are held.
 pub(super) const WINDOW: usize = 250;
 const HELD: f64 = 1e6;
-
-/// What the feet of one frame show: where the ray of the lowest row meets the ground, and that of one pixel farther up.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Feet {
-    place: DVec2,
-    above: DVec2,
-}
 
 /// Place along the route and phase (not wrapped) of one frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -106,107 +84,6 @@ pub(super) struct Frontal {
     pub(super) paces: Vec<Pace>,
     /// Whether the feet are those of all changes, or those of the firm ones: of who goes away, and of who comes nearer.
     by_all: [bool; 2],
-}
-
-/// How far the lowest row of the nearer foot lies ahead of the torso on the ground, metres, at places along a route.
-#[derive(Debug, Clone)]
-struct Reach {
-    walker: Walker,
-    camera: Camera,
-    route: Route,
-    /// Height of the ankle of a foot that stands.
-    ankle_m: f64,
-    nodes: BTreeMap<i64, [f64; PHASES]>,
-}
-
-impl Reach {
-    fn new(walker: &Walker, camera: &Camera, route: &Route) -> Self {
-        let ankle_m = |k: usize| walker.pose(DVec3::ZERO, 0.0, k as f64 / PHASES as f64).right.ankle.z;
-        let lowest_m = (0..PHASES).map(ankle_m).fold(f64::INFINITY, f64::min);
-        Self {
-            walker: walker.clone(),
-            camera: camera.clone(),
-            route: route.clone(),
-            ankle_m: lowest_m + walker.level_torso_height_m(),
-            nodes: BTreeMap::new(),
-        }
-    }
-
-    /// The reach at a place and phase, with its slopes by both.
-    fn at(&mut self, along_m: f64, phase: f64) -> [f64; 3] {
-        let (x, y) = (along_m / NODE_M, phase.rem_euclid(1.0) * PHASES as f64);
-        let (node, t) = (x.floor() as i64, x - x.floor());
-        let (k, u) = (y.floor() as usize % PHASES, y - y.floor());
-        let [[a, b], [c, d]] = [node, node + 1].map(|node| {
-            let values = self.node(node);
-            [values[k], values[(k + 1) % PHASES]]
-        });
-        let [near, far] = [a + u * (b - a), c + u * (d - c)];
-        let by_phase = PHASES as f64 * ((1.0 - t) * (b - a) + t * (d - c));
-        [near + t * (far - near), (far - near) / NODE_M, by_phase]
-    }
-
-    fn node(&mut self, node: i64) -> [f64; PHASES] {
-        if let Some(values) = self.nodes.get(&node) {
-            return *values;
-        }
-        let along_m = node as f64 * NODE_M;
-        let path = self.route.at(along_m);
-        let foot_m = self.walker.body.proportions.foot * self.walker.body.height_m;
-        let comes_nearer = comes_nearer(&path, along_m, &self.camera);
-        let [lead, shoe_m] = if comes_nearer { [LEAD[0], 0.0] } else { [LEAD[1], -SHOE * foot_m] };
-        let values = std::array::from_fn(|k| {
-            let phase = k as f64 / PHASES as f64 + lead;
-            // Both sides have the same curve, half a cycle apart.
-            0.5 * (self.nearer(&path, along_m, phase) + self.nearer(&path, along_m, phase + 0.5)) + shoe_m
-        });
-        self.nodes.insert(node, values);
-        values
-    }
-
-    /// The reach of the foot whose sole is lower in the image, below the torso; 0 where the camera does not see it.
-    fn nearer(&self, path: &Path, along_m: f64, phase: f64) -> f64 {
-        let height_m = self.walker.level_torso_height_m() + self.walker.gait.vertical_m(phase);
-        let torso = path.point(along_m, height_m);
-        let posed = self.walker.pose(torso, path.heading_rad, phase);
-        let soles = [posed.right, posed.left].map(|side| side.ankle - self.ankle_m * DVec3::Z);
-        let pixels = soles.iter().filter_map(|sole| self.camera.project_ideal(*sole));
-        let lowest = pixels.map(|pixel| pixel.y).reduce(f64::max);
-        let column = self.camera.project_ideal(torso).map(|pixel| pixel.x);
-        let pixel = column.zip(lowest).map(|(x, y)| DVec2::new(x, y));
-        let point = pixel.and_then(|pixel| self.camera.ground_point(pixel));
-        point.map_or(0.0, |point| path.along(point.truncate()) - along_m)
-    }
-}
-
-impl Feet {
-    /// Metres on the ground per pixel of the lowest row.
-    fn row_m(&self) -> f64 {
-        self.place.distance(self.above)
-    }
-}
-
-/// Where the lowest changes of a rectangle lie on the ground, and one pixel farther up; `None` above the horizon.
-fn feet(sighting: &Sighting, camera: &Camera) -> Option<Feet> {
-    let r = &sighting.rectangle;
-    let (middle, bottom) = (0.5 * (r.left + r.right) as f64, r.bottom as f64 - MASK_MARGIN_PX);
-    let on_ground = |row: f64| {
-        let pixel = DVec2::new(middle, row);
-        camera.ground_point(camera.undistort(pixel).ok()?).map(DVec3::truncate)
-    };
-    Some(Feet { place: on_ground(bottom)?, above: on_ground(bottom - 1.0)? })
-}
-
-/// A line of phase that explains the feet.
-struct Line {
-    /// Time of the first frame.
-    first_s: f64,
-    phase_at_start: f64,
-    rate_hz: f64,
-    /// Place at the first frame and speed.
-    place: [f64; 2],
-    /// Logarithm of the likelihood of the feet on it.
-    likelihood: f64,
 }
 
 impl Frontal {
@@ -278,7 +155,7 @@ impl Frontal {
         frontal.by_all[usize::from(comes_nearer(&path, 0.0, camera))] = by_all;
         // 2. The best line of phase against even motion.
         let points: Vec<(f64, f64)> = seen.iter().map(|(t, place)| (*t, path.along(*place))).collect();
-        let line = frontal.best_line(&points, rates)?;
+        let line = Line::nearest(&mut frontal.reach, &points, rates)?;
         let gain = (line.likelihood - evenly(&points)) / LIKE_FRAMES;
         Some((gain, frontal, line))
     }
@@ -315,32 +192,6 @@ impl Frontal {
             pace.contours = pace.contours.map(|[along_m, phase]| [place(along_m), phase]);
         }
         moved
-    }
-
-    /// The line of phase from which feet at (time, place) are the least off.
-    fn best_line(&mut self, points: &[(f64, f64)], rates: &CadenceRange) -> Option<Line> {
-        let ([first_m, speed_mps], _) = reweighted_line(points);
-        let first_s = points.first()?.0;
-        let mut best: Option<Line> = None;
-        for k in 0..RATES * OFFSETS {
-            let rate_hz =
-                rates.low_hz + (rates.high_hz - rates.low_hz) * (k / OFFSETS) as f64 / (RATES - 1) as f64;
-            let phase_at_start = 0.5 * (k % OFFSETS) as f64 / OFFSETS as f64;
-            let bodies: Vec<(f64, f64)> = points
-                .iter()
-                .map(|(t, along_m)| {
-                    let elapsed_s = t - first_s;
-                    let near_m = first_m + speed_mps * elapsed_s;
-                    (*t, along_m - self.reach.at(near_m, phase_at_start + rate_hz * elapsed_s)[0])
-                })
-                .collect();
-            let (place, off_m) = reweighted_line(&bodies);
-            let likelihood = likelihood(&off_m, WALKERS_OFF_M);
-            if best.as_ref().is_none_or(|best| likelihood > best.likelihood) {
-                best = Some(Line { first_s, phase_at_start, rate_hz, place, likelihood });
-            }
-        }
-        best
     }
 
     /// State at the first frame.
@@ -525,396 +376,5 @@ impl Frontal {
     }
 }
 
-/// The angle between a path and the line of sight to a place on it, in either direction.
-pub(super) fn off_the_sight_rad(path: &Path, along_m: f64, camera: &Camera) -> f64 {
-    let place = path.point(along_m, 0.0).truncate();
-    let sight = (place - camera.position().truncate()).normalize_or_zero();
-    path.direction().perp_dot(sight).abs().asin()
-}
-
-/// Whether who walks on a path comes nearer to the camera at a place on it.
-fn comes_nearer(path: &Path, along_m: f64, camera: &Camera) -> bool {
-    let place = path.point(along_m, 0.0).truncate();
-    path.direction().dot(camera.position().truncate() - place) > 0.0
-}
-
-/// The path on which somebody was seen at (time, place) on the ground, and the speed.
-fn path_through(seen: &[(f64, DVec2)]) -> Option<(Path, f64)> {
-    let first_s = seen.first()?.0;
-    let [(vx, x), (vy, y)] = [DVec2::X, DVec2::Y].map(|axis| {
-        line_through(&seen.iter().map(|(t, place)| (t - first_s, axis.dot(*place))).collect::<Vec<_>>())
-    });
-    let velocity = DVec2::new(vx, vy);
-    Some((Path { origin: DVec2::new(x, y), heading_rad: velocity.to_angle() }, velocity.length()))
-}
-
-/// Place at the first time and speed of the line through (time, place), by Cauchy weights; and how far the points are off,
-/// metres.
-fn reweighted_line(points: &[(f64, f64)]) -> ([f64; 2], Vec<f64>) {
-    let first_s = points.first().map_or(0.0, |p| p.0);
-    let mut line = [0.0; 2];
-    let mut off_m: Vec<f64> = vec![0.0; points.len()];
-    for _ in 0..STEPS {
-        let [mut w, mut wt, mut wtt, mut wx, mut wtx] = [0.0; 5];
-        for (off_m, (time_s, x)) in off_m.iter().zip(points) {
-            let (t, weight) = (time_s - first_s, 1.0 / (1.0 + (off_m / WALKERS_OFF_M).powi(2)));
-            w += weight;
-            wt += weight * t;
-            wtt += weight * t * t;
-            wx += weight * x;
-            wtx += weight * t * x;
-        }
-        let speed_mps = (w * wtx - wt * wx) / (w * wtt - wt * wt);
-        line = [(wx - speed_mps * wt) / w, speed_mps];
-        let off = |(time_s, x): &(f64, f64)| x - line[0] - line[1] * (time_s - first_s);
-        off_m = points.iter().map(off).collect();
-    }
-    (line, off_m)
-}
-
-/// Logarithm of the likelihood of points (time, place) of something that moves evenly.
-fn evenly(points: &[(f64, f64)]) -> f64 {
-    let (_, off_m) = reweighted_line(points);
-    SCALES_M.iter().map(|scale_m| likelihood(&off_m, *scale_m)).fold(f64::MIN, f64::max)
-}
-
-/// Logarithm of the likelihood of residuals after Cauchy's distribution of this scale, up to a constant.
-fn likelihood(off_m: &[f64], scale_m: f64) -> f64 {
-    -off_m.iter().map(|off| scale_m.ln() + (off / scale_m).powi(2).ln_1p()).sum::<f64>()
-}
-
 #[cfg(test)]
-pub(super) mod tests {
-    use super::super::decisions::HINDSIGHT_GAIN;
-    use super::super::search::tests::{camera, walker};
-    use super::super::walk::FrameEdges;
-    use super::*;
-    use crate::image::Rectangle;
-
-    const FRAME_S: f64 = 0.04;
-    const STEP_S: f64 = 0.5;
-    pub const SPEED_MPS: f64 = 1.2;
-    /// The middle of the picture, and where the walk is half-way through it.
-    pub const MIDDLE: DVec2 = DVec2::new(0.0, 0.0);
-
-    /// A frame in which the lowest changes are at a point of the ground.
-    fn frame(k: usize, place: DVec2) -> (Option<Sighting>, FrameEdges) {
-        let sole = camera().project(place.extend(0.0)).unwrap();
-        let [column, bottom] = [sole.x.round() as usize, (sole.y + MASK_MARGIN_PX).round() as usize];
-        let rectangle = Rectangle { left: column - 30, right: column + 30, top: bottom - 200, bottom };
-        let (window, time_s) = (rectangle, FRAME_S * k as f64);
-        let edges = FrameEdges::of_one_alone(k, time_s, window, vec![]);
-        (Some(Sighting { time_s, rectangle }), edges)
-    }
-
-    pub fn standing(count: usize, foot: impl Fn(f64) -> DVec2) -> Standing {
-        let kept = (0..count).map(|k| frame(k, foot(FRAME_S * k as f64))).collect();
-        Standing { kept, ..Standing::default() }
-    }
-
-    /// Towards the camera, which looks along the y axis.
-    pub fn towards() -> DVec2 {
-        (camera().position().truncate() - MIDDLE).normalize()
-    }
-
-    /// The nearer foot of a model that walks evenly, seen `LEAD` too early: the right heel strikes at 0, the left one a step
-    /// later. The picture is rendered and seen elsewhere, in the clothed walks.
-    pub fn feet_of_steps(time_s: f64) -> DVec2 {
-        let walker = walker();
-        let phase = 0.5 * time_s / STEP_S + LEAD[0];
-        let along_m = SPEED_MPS * time_s - 1.2;
-        let height_m = walker.level_torso_height_m() + walker.gait.vertical_m(phase);
-        let torso = (MIDDLE + towards() * along_m).extend(height_m);
-        let posed = walker.pose(torso, towards().to_angle(), phase);
-        let pixels = [posed.right.ankle, posed.left.ankle]
-            .map(|ankle| camera().project_ideal(ankle - 0.055 * DVec3::Z).unwrap());
-        let lower = if pixels[0].y > pixels[1].y { pixels[0] } else { pixels[1] };
-        camera().ground_point(lower).unwrap().truncate()
-    }
-
-    /// The same rectangle by both kinds of changes.
-    fn lowest(sighting: Option<Sighting>) -> Lowest {
-        Lowest { firm: sighting, all: sighting }
-    }
-
-    fn begun(standing: &Standing) -> Option<Frontal> {
-        Frontal::begin(standing, &camera(), &walker(), &CadenceRange::default())
-    }
-
-    #[test]
-    fn steps_towards_the_camera_show_path_speed_and_cadence() {
-        let frontal = begun(&standing(66, feet_of_steps)).unwrap();
-        let beginning = frontal.beginning();
-        assert!(frontal.route.at(0.0).direction().dot(towards()) > 0.998, "{:?}", frontal.route);
-        assert!((beginning.speed_mps - SPEED_MPS).abs() < 0.06, "{beginning:?}");
-        assert!((beginning.rate_hz - 0.5 / STEP_S).abs() < 0.03, "{beginning:?}");
-        for pace in &frontal.paces {
-            let off = 2.0 * pace.phase - pace.time_s / STEP_S;
-            assert!((off - off.round()).abs() < 0.06, "{}: {off}", pace.time_s);
-            assert!(
-                (pace.along_m - frontal.route.at(0.0).along(MIDDLE) + 1.2 - SPEED_MPS * pace.time_s).abs()
-                    < 0.05
-            );
-        }
-    }
-
-    #[test]
-    fn even_motion_and_noise_about_it_start_nobody() {
-        let even = |t: f64| MIDDLE + towards() * (SPEED_MPS * t - 1.2);
-        assert!(begun(&standing(66, even)).is_none());
-        // Rocking at the rate of steps, but by much less than legs reach, and noise.
-        let rocking = |t: f64| even(t) + towards() * 0.04 * (t / STEP_S * std::f64::consts::TAU).sin();
-        assert!(begun(&standing(66, rocking)).is_none());
-        let noisy = |t: f64| even(t) + towards() * 0.3 * ((t * 1e4).sin() * 43_758.5).fract();
-        assert!(begun(&standing(66, noisy)).is_none());
-        // What stays, and what cannot be seen on the ground.
-        assert!(begun(&standing(66, |_| MIDDLE)).is_none());
-        assert!(begun(&Standing::default()).is_none());
-    }
-
-    #[test]
-    fn a_path_far_beside_the_line_of_sight_starts_nobody() {
-        let turned = |deg: f64| {
-            let turn = DVec2::from_angle(deg.to_radians());
-            standing(66, move |t| MIDDLE + turn.rotate(feet_of_steps(t) - MIDDLE))
-        };
-        assert!(begun(&turned(20.0)).is_some() && begun(&turned(-20.0)).is_some());
-        assert!(begun(&turned(45.0)).is_none() && begun(&turned(-45.0)).is_none());
-    }
-
-    #[test]
-    fn frames_without_feet_lead_on_and_further_frames_are_solved() {
-        let mut frontal = begun(&standing(66, feet_of_steps)).unwrap();
-        let (seen, speed_mps) = (frontal.seen(), frontal.beginning().speed_mps);
-        assert_eq!(seen, 66);
-        for k in 66..76 {
-            frontal.push(FRAME_S * k as f64, &Lowest::default());
-        }
-        assert_eq!((frontal.seen(), frontal.paces.len()), (66, 76));
-        let led = frontal.paces[75].along_m - frontal.paces[65].along_m;
-        assert!((led - speed_mps * 10.0 * FRAME_S).abs() < 0.05, "{led}");
-        for k in 76..90 {
-            let sighting = frame(k, feet_of_steps(FRAME_S * k as f64)).0;
-            frontal.push(FRAME_S * k as f64, &lowest(sighting));
-            assert!(frontal.solve(frontal.paces.len() - 60).is_some());
-        }
-        let last = frontal.paces[89];
-        let true_m = SPEED_MPS * last.time_s - 1.2;
-        let place = frontal.route.at(0.0).point(last.along_m, 0.0).truncate();
-        assert!((place.dot(towards()) - true_m).abs() < 0.2, "{place}, {true_m}");
-        // Held frames stay where they are.
-        let before = frontal.paces[40];
-        frontal.solve(40);
-        assert!((frontal.paces[40].along_m - before.along_m).abs() < 1e-3);
-    }
-
-    #[test]
-    fn the_path_is_that_of_all_feet_in_the_end() {
-        // At first somebody drifts sideways.
-        let across = |t: f64| 0.16 * (2.0 - t).max(0.0) * towards().perp();
-        let place = |t: f64| feet_of_steps(t) + across(t);
-        let mut frontal = begun(&standing(50, place)).unwrap();
-        for k in 50..130 {
-            frontal.push(FRAME_S * k as f64, &lowest(frame(k, place(FRAME_S * k as f64)).0));
-        }
-        let off_deg =
-            |frontal: &Frontal| towards().angle_to(frontal.route.at(0.0).direction()).to_degrees().abs();
-        assert!(off_deg(&frontal) > 7.0, "{}", off_deg(&frontal));
-        let (renewed, variances) = frontal.on_path_of_all().unwrap();
-        assert!(off_deg(&renewed) < 3.0, "{}", off_deg(&renewed));
-        assert_eq!((renewed.paces.len(), variances.len()), (130, 130));
-        for pace in &renewed.paces {
-            let body = MIDDLE + towards() * (SPEED_MPS * pace.time_s - 1.2);
-            let off = renewed.route.at(0.0).point(pace.along_m, 0.0).truncate() - body;
-            let most_m = 0.1 + across(pace.time_s).length();
-            assert!(off.length() < most_m, "{}: {off} m", pace.time_s);
-        }
-        assert!(variances.iter().flatten().all(|variance| *variance > 0.0 && *variance < 0.01));
-    }
-
-    #[test]
-    fn reach_repeats_every_half_cycle_and_its_slopes_are_those_of_its_values() {
-        let path = Path { origin: MIDDLE, heading_rad: towards().to_angle() };
-        let mut reach = Reach::new(&walker(), &camera(), &path.into());
-        for k in 0..40 {
-            let (along_m, phase) = (-1.0 + 0.053 * f64::from(k), 0.037 * f64::from(k));
-            let [value, by_place, by_phase] = reach.at(along_m, phase);
-            assert!((value - reach.at(along_m, phase + 0.5)[0]).abs() < 1e-9);
-            let small = 1e-7;
-            let numeric = [
-                (reach.at(along_m + small, phase)[0] - value) / small,
-                (reach.at(along_m, phase + small)[0] - value) / small,
-            ];
-            assert!((by_place - numeric[0]).abs() < 1e-3 && (by_phase - numeric[1]).abs() < 1e-3);
-        }
-    }
-
-    /// A frame's own measurement lies where the body is; feet that are far off move neither place nor phase.
-    #[test]
-    fn feet_measure_the_place_of_the_body_and_outliers_move_nothing() {
-        let spoilt = |t: f64| {
-            let is_off = (t / FRAME_S).round() as usize % 5 == 2;
-            feet_of_steps(t) - if is_off { 1.2 * towards() } else { DVec2::ZERO }
-        };
-        let mut frontal = begun(&standing(66, feet_of_steps)).unwrap();
-        for k in 66..130 {
-            frontal.push(FRAME_S * k as f64, &lowest(frame(k, spoilt(FRAME_S * k as f64)).0));
-        }
-        frontal.solve(0).unwrap();
-        let still = ConstantVelocity::new(0.0, 0.0, 1.0, 1.0);
-        let before = State { along: still, height: still, phase: still };
-        let start_m = frontal.route.at(0.0).along(MIDDLE) - 1.2;
-        for k in 0..130 {
-            let pace = frontal.paces[k];
-            let true_m = start_m + SPEED_MPS * pace.time_s;
-            assert!((pace.along_m - true_m).abs() < 0.08, "{k}: {} of {true_m}", pace.along_m);
-            let state = frontal.state(k, 0, [0.01, 0.01], &before);
-            let measured_m = frontal.measured(k, &state).unwrap().along_m;
-            let expected_m = if k >= 66 && k % 5 == 2 { true_m - 1.2 } else { true_m };
-            assert!((measured_m - expected_m).abs() < 0.1, "{k}: {measured_m} of {expected_m}");
-        }
-    }
-
-    /// Feet whose errors are alike in neighbouring frames: places are off by about as much as is stated.
-    #[test]
-    fn the_stated_variance_is_that_of_errors_that_last_for_frames() {
-        let (mut sum, mut count) = (0.0, 0.0);
-        for draw in 0..12u64 {
-            let mut random = crate::synth::Random::new(draw);
-            let blocks: Vec<f64> = (0..40).map(|_| REACH_SD_M * f64::from(random.normal_pair()[0])).collect();
-            let place = |t: f64| {
-                let block = (t / FRAME_S / LIKE_FRAMES).round() as usize;
-                feet_of_steps(t) + blocks[block] * towards()
-            };
-            let Some(mut frontal) = begun(&standing(66, place)) else { continue };
-            for k in 66..110 {
-                frontal.push(FRAME_S * k as f64, &lowest(frame(k, place(FRAME_S * k as f64)).0));
-            }
-            let variances = frontal.solve(0).unwrap();
-            let start_m = frontal.route.at(0.0).along(MIDDLE) - 1.2;
-            for k in (10..100).step_by(10) {
-                let off_m = frontal.paces[k].along_m - start_m - SPEED_MPS * frontal.paces[k].time_s;
-                (sum, count) = (sum + off_m * off_m / variances[k][0], count + 1.0);
-            }
-        }
-        let z = f64::sqrt(sum / count);
-        println!("errors over stated deviations: {z:.2} of {count}");
-        assert!(count >= 72.0 && (0.4..1.0).contains(&z), "{z} of {count}");
-    }
-
-    /// A way that comes towards the camera and turns across the picture: a straight line, a quarter of a circle, a line.
-    fn corner() -> Route {
-        const RADIUS_M: f64 = 1.5;
-        let turn_m = RADIUS_M * std::f64::consts::FRAC_PI_2;
-        let point = |k: i32| {
-            let along_m = 0.02 * f64::from(k);
-            let on_turn_m = along_m.clamp(3.0, 3.0 + turn_m) - 3.0;
-            let angle = on_turn_m / RADIUS_M;
-            let before = DVec2::new(0.0, -along_m.min(3.0));
-            let turned = RADIUS_M * DVec2::new(1.0 - angle.cos(), -angle.sin());
-            let after = DVec2::new((along_m - 3.0 - turn_m).max(0.0), 0.0);
-            DVec2::new(-0.3, 2.5) + before + turned + after
-        };
-        Route::through(&(0..=400).map(point).collect::<Vec<_>>(), 0.0).unwrap()
-    }
-
-    /// The lower foot of somebody on a route, where the row of its sole meets the ground below the trunk.
-    fn feet_on(route: &Route, along_m: f64, phase: f64) -> DVec2 {
-        let walker = walker();
-        let path = route.at(along_m);
-        let torso = path.point(along_m, walker.level_torso_height_m() + walker.gait.vertical_m(phase));
-        let posed = walker.pose(torso, path.heading_rad, phase);
-        let rows = [posed.right, posed.left]
-            .map(|side| camera().project_ideal(side.ankle - 0.055 * DVec3::Z).unwrap().y);
-        let pixel = DVec2::new(camera().project_ideal(torso).unwrap().x, rows[0].max(rows[1]));
-        camera().ground_point(pixel).unwrap().truncate()
-    }
-
-    /// Feet lead along the line of sight, contours beyond; both in the same cycle, and where the feet alone are seen too.
-    #[test]
-    fn feet_and_contours_show_one_way_around_a_corner() {
-        let route = corner();
-        let along = |k: usize| SPEED_MPS * FRAME_S * k as f64;
-        let cycle = |k: usize| 0.5 * FRAME_S * k as f64 / STEP_S;
-        let mut frontal = Frontal::on_route(&route, &walker(), &camera());
-        let mut turned = 0;
-        for k in 0..130 {
-            let seen = frame(k, feet_on(&route, along(k), cycle(k) + LEAD[0])).0;
-            let feet = frontal.feet_of(&lowest(seen), along(k));
-            // Places and phases start off by a little, and contours are far off where they do not count.
-            let is_across = !frontal.is_along(along(k));
-            turned += usize::from(is_across);
-            let off = if is_across { 0.0 } else { 0.2 };
-            let contours = Some([along(k) + off, cycle(k) + off]);
-            let (along_m, phase) = (along(k) + 0.1, cycle(k) + 0.05);
-            frontal.paces.push(Pace { time_s: FRAME_S * k as f64, feet, contours, along_m, phase });
-        }
-        assert!((30..100).contains(&turned), "{turned}");
-        let variances = frontal.solve(0).unwrap();
-        assert_eq!(variances.len(), 130);
-        for (k, pace) in frontal.paces.iter().enumerate() {
-            assert!((pace.along_m - along(k)).abs() < 0.08, "{k}: {} {}", pace.along_m, along(k));
-            assert!((pace.phase - cycle(k)).abs() < 0.04, "{k}: {} {}", pace.phase, cycle(k));
-        }
-    }
-
-    #[test]
-    fn frames_before_a_walk_go_on_with_its_steps_backwards_and_even_motion_does_not() {
-        let route = corner();
-        let along = |k: usize| SPEED_MPS * FRAME_S * k as f64;
-        let cycle = |k: usize| 0.5 * FRAME_S * k as f64 / STEP_S;
-        let gain = |is_walking: bool| {
-            let mut frontal = Frontal::on_route(&route, &walker(), &camera());
-            for k in 50..110 {
-                let contours = Some([along(k), cycle(k)]);
-                let (along_m, phase) = (along(k), cycle(k));
-                frontal.paces.push(Pace { time_s: FRAME_S * k as f64, feet: None, contours, along_m, phase });
-            }
-            for k in (0..50).rev() {
-                let place = match is_walking {
-                    true => feet_on(&route, along(k), cycle(k) + LEAD[0]),
-                    false => route.place(along(k) + 0.3),
-                };
-                frontal.precede(FRAME_S * k as f64, &lowest(frame(k, place).0), route.place(along(k)));
-                frontal.solve(0).unwrap();
-            }
-            if is_walking {
-                for (k, pace) in frontal.paces.iter().enumerate() {
-                    assert!((pace.along_m - along(k)).abs() < 0.1, "{k}: {} {}", pace.along_m, along(k));
-                    assert!((pace.phase - cycle(k)).abs() < 0.06, "{k}: {} {}", pace.phase, cycle(k));
-                }
-                assert!((frontal.speed_mps(0..50) - SPEED_MPS).abs() < 0.1);
-            }
-            frontal.gain(0..50).unwrap()
-        };
-        let gains = [true, false].map(gain);
-        assert!(gains[0] > 2.0 * HINDSIGHT_GAIN && gains[1] < 0.0, "{gains:?}");
-    }
-
-    #[test]
-    fn places_on_another_route_are_where_they_were() {
-        let route = corner();
-        let mut frontal = Frontal::on_route(&route, &walker(), &camera());
-        for k in 0..60 {
-            let (along_m, phase) = (0.1 * f64::from(k), 0.05 * f64::from(k));
-            let contours = Some([along_m, phase]);
-            frontal.paces.push(Pace { time_s: f64::from(k), feet: None, contours, along_m, phase });
-        }
-        let start = route.place(1.0);
-        let moved = frontal.moved_to(&route.moved(start, 1.0, 0.0, 0.0));
-        for (a, b) in frontal.paces.iter().zip(&moved.paces) {
-            assert!(route.place(a.along_m).distance(moved.route.place(b.along_m)) < 0.01);
-            assert!((b.contours.unwrap()[0] - b.along_m).abs() < 1e-9 && a.phase == b.phase);
-        }
-    }
-
-    #[test]
-    fn a_reweighted_line_ignores_what_lies_far_off() {
-        let mut points: Vec<(f64, f64)> =
-            (0..40).map(|k| (0.04 * f64::from(k), 2.0 + 0.04 * f64::from(k))).collect();
-        (0..8).for_each(|k| points[5 * k].1 -= 1.5);
-        let ([place, speed], off_m) = reweighted_line(&points);
-        assert!((place - 2.0).abs() < 0.02 && (speed - 1.0).abs() < 0.02, "{place} {speed}");
-        assert!(off_m[0] < -1.4 && off_m[1].abs() < 0.03);
-    }
-}
+pub(super) mod tests;

@@ -120,7 +120,7 @@ impl Tracked<'_> {
         let is_given = self.height.source == HeightSource::Given && self.tilt.is_none();
         let is_off = fit.quality.verdict() != FitVerdict::Well
             || fit.height.is_some_and(|seen| self.height.contradicts(&seen));
-        let height = || problem.of_height(&BodyHeight::POPULATION).fit(gait, None).ok()?.height;
+        let height = || problem.of_any_height().fit(gait, None).ok()?.height;
         match (is_given && is_off).then(height).flatten() {
             Some(seen) => WalkFit { height: Some(seen), ..fit },
             None => fit,

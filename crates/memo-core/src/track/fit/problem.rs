@@ -51,6 +51,8 @@ pub(crate) struct Problem<'a> {
     /// Standard deviation of the height of a standing foot, metres.
     ground_sd_m: f64,
     is_on_treadmill: bool,
+    /// What the edge of a sole counts in the last steps, of what it counts in the cost.
+    sole: f64,
     /// Mean share of the person that nobody else hid.
     visible_share: f64,
     /// The foot of the walk's middle, about which the heading turns, and its place along the tracker's path.
@@ -175,6 +177,7 @@ impl<'a> Problem<'a> {
             is_scale_seen: true,
             ground_sd_m: GROUND_SD_M,
             is_on_treadmill: false,
+            sole: SOLE,
             visible_share: visible / frames.len().max(1) as f64,
             origin,
             origin_along_m,
@@ -188,6 +191,11 @@ impl<'a> Problem<'a> {
         self.excess =
             Prior { mean: height.height_m / height_m - 1.0, sd: height.sd_in_camera_m() / height_m };
         self
+    }
+
+    /// The same of a person of any height. It follows from the distance, and that from the soles, so they count fully.
+    pub fn of_any_height(self) -> Self {
+        Self { sole: 1.0, ..self.of_height(&BodyHeight::POPULATION) }
     }
 
     /// The same in an assumed camera, whose ground and whose direction of sight are assumed too: distance and heading
@@ -311,7 +319,7 @@ impl<'a> Problem<'a> {
         let height_px = self.height_px(&unknowns)?;
         let mut cost = f64::INFINITY;
         for n in 0..STEPS[0] {
-            cost = self.step(&mut unknowns, &Width::of_step(n, height_px), Stage::Start)?.0.cost;
+            cost = self.step(&mut unknowns, &self.width(n, height_px), Stage::Start)?.0.cost;
         }
         Some((cost, unknowns))
     }
@@ -321,7 +329,7 @@ impl<'a> Problem<'a> {
         let height_px = self.height_px(&unknowns)?;
         let mut cost = f64::INFINITY;
         for n in STEPS[0]..FRAMES_STEP {
-            cost = self.step(&mut unknowns, &Width::of_step(n, height_px), Stage::Curves)?.0.cost;
+            cost = self.step(&mut unknowns, &self.width(n, height_px), Stage::Curves)?.0.cost;
         }
         Some(cost)
     }
@@ -332,7 +340,7 @@ impl<'a> Problem<'a> {
         let mut last = None;
         for n in STEPS[0]..STEPS.iter().sum() {
             let stage = if n < FRAMES_STEP { Stage::Curves } else { Stage::Frames };
-            last = Some(self.step(&mut unknowns, &Width::of_step(n, height_px), stage)?);
+            last = Some(self.step(&mut unknowns, &self.width(n, height_px), stage)?);
         }
         let (seen, solution) = last?;
         Some(Fitted { unknowns, seen, solution, height_px })
@@ -379,7 +387,13 @@ impl<'a> Problem<'a> {
 
     /// Search width and weights of the last step from a starting gait.
     pub(super) fn last_start_width(&self, unknowns: &Unknowns) -> Option<Width> {
-        Some(Width::of_step(STEPS[0] - 1, self.height_px(unknowns)?))
+        Some(self.width(STEPS[0] - 1, self.height_px(unknowns)?))
+    }
+
+    /// Search width and weights of a step.
+    fn width(&self, n: usize, height_px: f64) -> Width {
+        let sole = if n < FRAMES_STEP { 1.0 } else { self.sole };
+        Width { sole, ..Width::of_step(n, height_px) }
     }
 
     /// The figure of a frame.
@@ -593,8 +607,7 @@ impl Width {
         let done = n as f64 / (STEPS.iter().sum::<usize>() - 1) as f64;
         let at = |[first, last]: [f64; 2]| height_px * (first + (last - first) * done);
         let reach = Reach::new(at(REACH).max(LEAST_REACH_PX));
-        let sole = if n < FRAMES_STEP { 1.0 } else { SOLE };
-        Self { reach, scale_px: at(SCALE).max(1.0), height_px, sole }
+        Self { reach, scale_px: at(SCALE).max(1.0), height_px, sole: 1.0 }
     }
 
     fn spacing_px(&self) -> f64 {

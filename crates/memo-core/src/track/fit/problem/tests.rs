@@ -278,7 +278,7 @@ fn soles_move_the_person_less_in_the_last_steps() {
         (normal[(HEIGHT, HEIGHT)], seen.cost)
     };
     let of_step = |n: usize, sole: Option<f64>| {
-        let width = Width::of_step(n, height_px);
+        let width = problem.width(n, height_px);
         said(&Width { sole: sole.unwrap_or(width.sole), ..width })
     };
     for (n, counts) in [(0, 1.0), (FRAMES_STEP - 1, 1.0), (FRAMES_STEP, SOLE), (11, SOLE)] {
@@ -288,6 +288,9 @@ fn soles_move_the_person_less_in_the_last_steps() {
         assert!((now - without - counts * (with - without)).abs() < 1e-6 * with, "{n}: {now}");
         assert_eq!(cost, of_step(n, Some(0.0)).1, "{n}");
     }
+    // The height of a person of any height comes from the soles.
+    let problem = problem.of_any_height();
+    assert!((0..12).all(|n| problem.width(n, height_px).sole == 1.0));
 }
 
 /// Of a person of whom half is hidden, the same outlines are half of the evidence.
