@@ -173,11 +173,6 @@ impl Active {
         self.steps().partition_point(|step| step.time_s < time_s)
     }
 
-    /// Where the person was and went in the last frame before a time.
-    pub(super) fn sign_before(&self, time_s: f64) -> Option<Sign> {
-        self.sign_at(self.frames_before(time_s).checked_sub(1)?)
-    }
-
     /// Drops the frames from a time on.
     pub(super) fn end_before(&mut self, time_s: f64) {
         let first = self.steps().get(self.frames_before(time_s)).map(|step| step.frame);
@@ -194,7 +189,10 @@ impl Active {
             false => (speed_mps * path.direction(), speed_mps.signum() * path.direction()),
         };
         let place_m = path.point(step.state.along.position, 0.0).truncate();
-        Some(Sign { time_s: step.time_s, place_m, velocity_mps, way, stands: false })
+        // The turn of the last second.
+        let before = self.walk.route.at(step.state.along.position - speed_mps);
+        let turn_rad_per_s = if self.is_on_treadmill { 0.0 } else { path.heading_rad - before.heading_rad };
+        Some(Sign { time_s: step.time_s, place_m, velocity_mps, way, turn_rad_per_s, stands: false })
     }
 
     /// The person as followed in the last frame.

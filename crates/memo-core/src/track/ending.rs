@@ -102,11 +102,11 @@ impl Active {
             && STRIDE_HEIGHTS.contains(&stride)
     }
 
-    /// Removes the frames before the person appeared and those after the walk was over or the person was gone.
+    /// The frames from where the person appeared to where the walk was over or the person was gone.
     ///
     /// A person who appears between two frames also changes the empty frame, because eq. (1) uses both
     /// neighbours.
-    pub(super) fn trim(&mut self) {
+    fn seen_range(&self) -> std::ops::Range<usize> {
         let twin = self.walk.best_twin();
         let low = LOST_SHARE * usual_similarity(twin);
         let absent = twin.steps.iter().take_while(|s| f64::from(s.similarity) < low).count();
@@ -119,7 +119,17 @@ impl Active {
         let end = twin.steps.len() - over.max(gone.unwrap_or(0));
         let frontal = self.frontal.as_ref().filter(|_| twin.steps.last().is_some_and(|step| step.by_feet));
         let end = frontal.map_or(end, |frontal| frontal.seen().min(end));
-        self.walk.keep(absent.min(end)..end);
+        absent.min(end)..end
+    }
+
+    /// Removes the other frames.
+    pub(super) fn trim(&mut self) {
+        self.walk.keep(self.seen_range());
+    }
+
+    /// Where the person was and went when last seen before a time.
+    pub(super) fn last_seen_before(&self, time_s: f64) -> Option<Sign> {
+        self.sign_at(self.frames_before(time_s).min(self.seen_range().end).checked_sub(1)?)
     }
 }
 

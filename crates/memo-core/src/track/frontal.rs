@@ -30,8 +30,8 @@ use crate::estimate::arrow::{Arrow, velocity_change};
 use crate::estimate::kalman::ConstantVelocity;
 use crate::model::{Camera, Walker};
 use glam::DVec2;
-use reach::{Feet, Reach, comes_nearer, feet};
-use rhythm::{Line, WALKERS_OFF_M, evenly, likelihood, path_through};
+use reach::{Feet, NEARER_OFF_M, Reach, comes_nearer, feet};
+use rhythm::{Line, evenly, path_through};
 
 pub(super) use reach::off_the_sight_rad;
 
@@ -153,6 +153,7 @@ impl Frontal {
         }
         let mut frontal = Self::on_route(&path.into(), walker, camera);
         frontal.by_all[usize::from(comes_nearer(&path, 0.0, camera))] = by_all;
+        frontal.reach.is_firm = !frontal.by_all[1];
         // 2. The best line of phase against even motion.
         let points: Vec<(f64, f64)> = seen.iter().map(|(t, place)| (*t, path.along(*place))).collect();
         let line = Line::nearest(&mut frontal.reach, &points, rates)?;
@@ -184,7 +185,7 @@ impl Frontal {
 
     /// The same places on another route.
     pub(super) fn moved_to(&self, route: &Route) -> Self {
-        let reach = Reach::new(&self.reach.walker, &self.reach.camera, route);
+        let reach = self.reach.on(route);
         let mut moved = Self { route: route.clone(), reach, ..self.clone() };
         for pace in &mut moved.paces {
             let place = |along_m: f64| route.along(self.route.place(along_m), along_m);
@@ -245,18 +246,18 @@ impl Frontal {
     /// How much more likely (logarithm) the feet of some frames along the line of sight are as solved than in even motion;
     /// `None` if they are too few.
     pub(super) fn gain(&mut self, range: std::ops::Range<usize>) -> Option<f64> {
-        let (mut points, mut off_m) = (Vec::new(), Vec::new());
+        let (mut points, mut likelihood) = (Vec::new(), 0.0);
         for k in range {
             let Pace { time_s, feet, along_m, phase, .. } = self.paces[k];
             let Some(feet) = feet.filter(|_| self.is_along(along_m)) else { continue };
             let seen_m = self.route.at(along_m).along(feet.place);
-            off_m.push(seen_m - along_m - self.reach.at(along_m, phase)[0]);
+            likelihood += self.reach.at(along_m, phase).likelier(seen_m - along_m).2;
             points.push((time_s, seen_m));
         }
         if points.len() < LEADING {
             return None;
         }
-        Some((likelihood(&off_m, WALKERS_OFF_M) - evenly(&points)) / LIKE_FRAMES)
+        Some((likelihood - evenly(&points)) / LIKE_FRAMES)
     }
 
     /// Whether feet and not contours show the place and phase of a frame.
@@ -311,9 +312,13 @@ impl Frontal {
     /// What the feet of a frame measure at its phase.
     fn measured(&mut self, k: usize, state: &State) -> Option<Hypothesis> {
         let Pace { feet, along_m, phase, .. } = self.paces[k];
-        let reach_m = self.reach.at(along_m, phase)[0];
+        let expected = self.reach.at(along_m, phase);
         let path = self.route.at(along_m);
-        feet.map(|feet| Hypothesis { along_m: path.along(feet.place) - reach_m, ..state.hypothesis() })
+        feet.map(|feet| {
+            let seen_m = path.along(feet.place);
+            let ([reach_m, ..], ..) = expected.likelier(seen_m - along_m);
+            Hypothesis { along_m: seen_m - reach_m, ..state.hypothesis() }
+        })
     }
 
     /// Solves for places and phases from an index on.
@@ -339,9 +344,12 @@ impl Frontal {
                     continue;
                 }
                 let Some(feet) = feet else { continue };
-                let [reach_m, by_place, by_phase] = self.reach.at(along_m, phase);
-                let variance = REACH_SD_M.powi(2) + (ROW_SD_PX * feet.row_m()).powi(2);
-                let off_m = self.route.at(along_m).along(feet.place) - along_m - reach_m;
+                let ahead_m = self.route.at(along_m).along(feet.place) - along_m;
+                let ([reach_m, by_place, by_phase], scale_m, _) =
+                    self.reach.at(along_m, phase).likelier(ahead_m);
+                let reach_sd_m = REACH_SD_M * scale_m / NEARER_OFF_M;
+                let variance = reach_sd_m.powi(2) + (ROW_SD_PX * feet.row_m()).powi(2);
+                let off_m = ahead_m - reach_m;
                 let weight = 1.0 / (1.0 + off_m * off_m / (CAUCHY_SD * CAUCHY_SD * variance));
                 let right = off_m + (1.0 + by_place) * along_m + by_phase * phase;
                 arrow.add_row(

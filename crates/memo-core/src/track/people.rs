@@ -36,6 +36,8 @@ pub(super) struct Sign {
     pub velocity_mps: DVec2,
     /// The direction that the person walks in, also on a treadmill.
     pub way: DVec2,
+    /// How fast that direction changes, radians per second to the left.
+    pub turn_rad_per_s: f64,
     /// Whether the person stood still.
     pub stands: bool,
 }
@@ -128,11 +130,24 @@ impl Sign {
             let off_m = self.place_m.distance(later.place_m);
             return (elapsed_s >= 0.0 && off_m <= PLACE_M).then_some(off_m);
         }
-        let off_m = (self.place_m + elapsed_s * self.velocity_mps).distance(later.place_m);
-        let is_same = elapsed_s >= 0.0
-            && off_m <= PLACE_M + PLACE_M_PER_S * elapsed_s
-            && self.way.dot(later.way) >= SAME_WAY;
-        is_same.then_some(off_m)
+        // Who turned goes on to turn, or straight on.
+        let off_m = |turn_rad: f64| {
+            let off_m = self.led(elapsed_s, turn_rad).distance(later.place_m);
+            let is_same = elapsed_s >= 0.0
+                && off_m <= PLACE_M + PLACE_M_PER_S * elapsed_s
+                && DVec2::from_angle(turn_rad).rotate(self.way).dot(later.way) >= SAME_WAY;
+            is_same.then_some(off_m)
+        };
+        let [straight, turned] = [0.0, elapsed_s * self.turn_rad_per_s].map(off_m);
+        [straight, turned].into_iter().flatten().reduce(f64::min)
+    }
+
+    /// Where the person is after some time, on an arc that turns by an angle.
+    fn led(&self, elapsed_s: f64, turn_rad: f64) -> DVec2 {
+        // The chord of an arc is shorter than the arc by sin(a) / a, half-way turned.
+        let half_rad = 0.5 * turn_rad;
+        let chord = if half_rad.abs() < 1e-6 { 1.0 } else { half_rad.sin() / half_rad };
+        self.place_m + chord * elapsed_s * DVec2::from_angle(half_rad).rotate(self.velocity_mps)
     }
 
     /// True if the person is expected back at a time.
@@ -147,7 +162,14 @@ mod tests {
 
     fn sign(time_s: f64, x: f64, speed_mps: f64) -> Sign {
         let (place_m, velocity_mps) = (DVec2::new(x, 5.0), DVec2::new(speed_mps, 0.0));
-        Sign { time_s, place_m, velocity_mps, way: velocity_mps.normalize(), stands: false }
+        Sign {
+            time_s,
+            place_m,
+            velocity_mps,
+            way: velocity_mps.normalize(),
+            turn_rad_per_s: 0.0,
+            stands: false,
+        }
     }
 
     #[test]
@@ -170,6 +192,26 @@ mod tests {
             people.end(0, sign(2.0, 2.4, 1.2));
             assert_eq!(people.appear(&other), 1, "{other:?}");
         }
+    }
+
+    /// Half a circle of 2 m to the left, of somebody who was seen in its first quarter.
+    #[test]
+    fn who_turned_is_expected_on_the_arc_and_straight_on() {
+        let turn_rad_per_s = 0.6;
+        let end = Sign { turn_rad_per_s, ..sign(2.0, 0.0, 1.2) };
+        let on_arc = |elapsed_s: f64| {
+            let way = DVec2::from_angle(turn_rad_per_s * elapsed_s);
+            let place_m = DVec2::new(0.0, 7.0) + 2.0 * DVec2::new(way.y, -way.x);
+            Sign { time_s: 2.0 + elapsed_s, place_m, way, ..sign(2.0, 0.0, 1.2) }
+        };
+        for elapsed_s in [0.5, 1.0, 2.0] {
+            let there = on_arc(elapsed_s);
+            assert!(end.distance_to(&there).unwrap() < 1e-9, "{elapsed_s}");
+            assert!(!end.leads_to(&Sign { way: -there.way, ..there }));
+        }
+        assert!(end.leads_to(&sign(3.0, 1.2, 1.2)));
+        let straight = Sign { turn_rad_per_s: 0.0, ..end };
+        assert!(!straight.leads_to(&on_arc(2.0)) && straight.leads_to(&sign(3.0, 1.2, 1.2)));
     }
 
     #[test]

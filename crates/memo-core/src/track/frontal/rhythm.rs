@@ -2,16 +2,14 @@
 
 use super::super::search::Path;
 use super::super::start::CadenceRange;
-use super::reach::Reach;
+use super::reach::{Expected, NEARER_OFF_M, Reach};
 use crate::estimate::line::line_through;
 use glam::DVec2;
 
 /// Lines of phase that are compared at a start: cadences, and phases within half a cycle.
 const RATES: usize = 40;
 const OFFSETS: usize = 25;
-/// How far the feet of walkers are off their line of phase, the scale of Cauchy's distribution, metres. Things that are no
-/// walkers may be off even motion by any of `SCALES_M`.
-pub(super) const WALKERS_OFF_M: f64 = 0.06;
+/// Things that are no walkers may be off even motion by any of these scales of Cauchy's distribution, metres.
 const SCALES_M: [f64; 8] = [0.02, 0.035, 0.05, 0.075, 0.1, 0.15, 0.3, 0.6];
 /// Steps of the reweighted line.
 const STEPS: usize = 6;
@@ -38,16 +36,26 @@ impl Line {
             let rate_hz =
                 rates.low_hz + (rates.high_hz - rates.low_hz) * (k / OFFSETS) as f64 / (RATES - 1) as f64;
             let phase_at_start = 0.5 * (k % OFFSETS) as f64 / OFFSETS as f64;
-            let bodies: Vec<(f64, f64)> = points
+            let expected: Vec<Expected> = points
                 .iter()
-                .map(|(t, along_m)| {
+                .map(|(t, _)| {
                     let elapsed_s = t - first_s;
-                    let near_m = first_m + speed_mps * elapsed_s;
-                    (*t, along_m - reach.at(near_m, phase_at_start + rate_hz * elapsed_s)[0])
+                    reach.at(first_m + speed_mps * elapsed_s, phase_at_start + rate_hz * elapsed_s)
                 })
                 .collect();
-            let (place, off_m) = reweighted_line(&bodies);
-            let likelihood = likelihood(&off_m, WALKERS_OFF_M);
+            let mut place = [first_m, speed_mps];
+            for _ in 0..STEPS {
+                place = line_of(points.iter().zip(&expected).map(|((t, along_m), expected)| {
+                    let led_m = place[0] + place[1] * (t - first_s);
+                    let ([reach_m, ..], scale_m, _) = expected.likelier(along_m - led_m);
+                    let off_m = along_m - led_m - reach_m;
+                    (t - first_s, along_m - reach_m, 1.0 / (scale_m * scale_m + off_m * off_m))
+                }));
+            }
+            let of_point = |((t, along_m), expected): (&(f64, f64), &Expected)| {
+                expected.likelier(along_m - place[0] - place[1] * (t - first_s)).2
+            };
+            let likelihood = points.iter().zip(&expected).map(of_point).sum();
             if best.as_ref().is_none_or(|best| likelihood > best.likelihood) {
                 best = Some(Self { first_s, phase_at_start, rate_hz, place, likelihood });
             }
@@ -66,6 +74,20 @@ pub(super) fn path_through(seen: &[(f64, DVec2)]) -> Option<(Path, f64)> {
     Some((Path { origin: DVec2::new(x, y), heading_rad: velocity.to_angle() }, velocity.length()))
 }
 
+/// Place at time 0 and speed of the line through (time, place, weight).
+fn line_of(points: impl Iterator<Item = (f64, f64, f64)>) -> [f64; 2] {
+    let [mut w, mut wt, mut wtt, mut wx, mut wtx] = [0.0; 5];
+    for (t, x, weight) in points {
+        w += weight;
+        wt += weight * t;
+        wtt += weight * t * t;
+        wx += weight * x;
+        wtx += weight * t * x;
+    }
+    let speed_mps = (w * wtx - wt * wx) / (w * wtt - wt * wt);
+    [(wx - speed_mps * wt) / w, speed_mps]
+}
+
 /// Place at the first time and speed of the line through (time, place), by Cauchy weights; and how far the points are off,
 /// metres.
 fn reweighted_line(points: &[(f64, f64)]) -> ([f64; 2], Vec<f64>) {
@@ -73,17 +95,8 @@ fn reweighted_line(points: &[(f64, f64)]) -> ([f64; 2], Vec<f64>) {
     let mut line = [0.0; 2];
     let mut off_m: Vec<f64> = vec![0.0; points.len()];
     for _ in 0..STEPS {
-        let [mut w, mut wt, mut wtt, mut wx, mut wtx] = [0.0; 5];
-        for (off_m, (time_s, x)) in off_m.iter().zip(points) {
-            let (t, weight) = (time_s - first_s, 1.0 / (1.0 + (off_m / WALKERS_OFF_M).powi(2)));
-            w += weight;
-            wt += weight * t;
-            wtt += weight * t * t;
-            wx += weight * x;
-            wtx += weight * t * x;
-        }
-        let speed_mps = (w * wtx - wt * wx) / (w * wtt - wt * wt);
-        line = [(wx - speed_mps * wt) / w, speed_mps];
+        let weight = |off_m: &f64| 1.0 / (1.0 + (off_m / NEARER_OFF_M).powi(2));
+        line = line_of(off_m.iter().zip(points).map(|(off_m, (t, x))| (t - first_s, *x, weight(off_m))));
         let off = |(time_s, x): &(f64, f64)| x - line[0] - line[1] * (time_s - first_s);
         off_m = points.iter().map(off).collect();
     }
@@ -97,7 +110,7 @@ pub(super) fn evenly(points: &[(f64, f64)]) -> f64 {
 }
 
 /// Logarithm of the likelihood of residuals after Cauchy's distribution of this scale, up to a constant.
-pub(super) fn likelihood(off_m: &[f64], scale_m: f64) -> f64 {
+fn likelihood(off_m: &[f64], scale_m: f64) -> f64 {
     -off_m.iter().map(|off| scale_m.ln() + (off / scale_m).powi(2).ln_1p()).sum::<f64>()
 }
 

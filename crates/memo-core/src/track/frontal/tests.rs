@@ -4,6 +4,7 @@ use super::super::walk::FrameEdges;
 use super::reach::LEAD;
 use super::*;
 use crate::image::Rectangle;
+use crate::model::body::Part;
 use crate::track::locate::MASK_MARGIN_PX;
 use glam::DVec3;
 
@@ -48,6 +49,26 @@ pub fn feet_of_steps(time_s: f64) -> DVec2 {
     camera().ground_point(lower).unwrap().truncate()
 }
 
+/// The same, but of a foot that has stood for 0.1 to 0.3 s nothing is seen: then it is the sole of the foot that swings.
+fn moving_feet(time_s: f64) -> DVec2 {
+    if !(0.1..0.3).contains(&time_s.rem_euclid(STEP_S)) {
+        return feet_of_steps(time_s);
+    }
+    let walker = walker();
+    let phase = 0.5 * time_s / STEP_S + LEAD[0];
+    let height_m = walker.level_torso_height_m() + walker.gait.vertical_m(phase);
+    let torso = (MIDDLE + towards() * (SPEED_MPS * time_s - 1.2)).extend(height_m);
+    let posed = walker.pose(torso, towards().to_angle(), phase);
+    let lowest = [posed.right, posed.left].map(|side| side.ankle - 0.055 * DVec3::Z);
+    let feet = [Part::RightFoot, Part::LeftFoot].map(|foot| &posed.cylinders[foot as usize]);
+    let swings = usize::from(lowest[1].z > lowest[0].z);
+    let axis = feet[swings].world_from_cylinder.matrix3.z_axis;
+    let middle = 0.5 * (lowest[swings] + feet[swings].centre() + feet[swings].half_length * axis);
+    let on_ground = camera().ground_point(camera().project_ideal(middle).unwrap()).unwrap();
+    // On the line below the torso, as rectangles are.
+    MIDDLE + towards() * (on_ground.truncate() - MIDDLE).dot(towards())
+}
+
 /// The same rectangle by both kinds of changes.
 fn lowest(sighting: Option<Sighting>) -> Lowest {
     Lowest { firm: sighting, all: sighting }
@@ -70,6 +91,25 @@ fn steps_towards_the_camera_show_path_speed_and_cadence() {
         assert!(
             (pace.along_m - frontal.route.at(0.0).along(MIDDLE) + 1.2 - SPEED_MPS * pace.time_s).abs() < 0.05
         );
+    }
+}
+
+/// The foot that swings behind the one that stands is part of the rhythm, and no outlier.
+#[test]
+fn feet_that_are_seen_only_while_they_move_show_steps_as_well() {
+    let standing = standing(66, moving_feet);
+    let sightings = standing.sightings();
+    let gain = |by_all: bool| {
+        Frontal::on_line(&sightings, by_all, &camera(), &walker(), &CadenceRange::default()).unwrap().0
+    };
+    assert!(gain(false) > gain(true) + 1.0, "{} {}", gain(false), gain(true));
+    let frontal = begun(&standing).unwrap();
+    let start_m = frontal.route.at(0.0).along(MIDDLE) - 1.2;
+    for pace in &frontal.paces {
+        let off = 2.0 * pace.phase - pace.time_s / STEP_S;
+        assert!((off - off.round()).abs() < 0.1, "{}: {off}", pace.time_s);
+        let off_m = pace.along_m - start_m - SPEED_MPS * pace.time_s;
+        assert!(off_m.abs() < 0.1, "{}: {off_m}", pace.time_s);
     }
 }
 

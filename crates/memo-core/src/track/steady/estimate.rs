@@ -63,6 +63,15 @@ pub struct Estimate {
 }
 
 impl Estimate {
+    const START: Self = Self {
+        rotation: DMat3::IDENTITY,
+        gain: 1.0,
+        offset: 0.0,
+        support: 0.0,
+        sd_px: f64::INFINITY,
+        zoom: [0.0, f64::INFINITY],
+    };
+
     /// True if the rotation is determined and explains at least this share of the points.
     pub fn is_supported(&self, least: f64) -> bool {
         self.support >= least && self.sd_px <= MOST_SD_PX
@@ -86,14 +95,7 @@ impl Comparison<'_> {
     /// The rotation, from the coarsest of the `levels` finest ones on, starting at `from`; `None` if too little of the
     /// template is in the picture or the equations are singular.
     pub fn estimate(&self, template: &Template, from: &Turned, levels: usize) -> Option<Estimate> {
-        let mut at = Estimate {
-            rotation: *from,
-            gain: 1.0,
-            offset: 0.0,
-            support: 0.0,
-            sd_px: f64::INFINITY,
-            zoom: [0.0, f64::INFINITY],
-        };
+        let mut at = Estimate { rotation: *from, ..Estimate::START };
         for level in (0..levels).rev() {
             for round in 0..MOST_ROUNDS {
                 let is_first = round == 0 && level + 1 == levels;
@@ -105,6 +107,13 @@ impl Comparison<'_> {
         }
         self.judge(&template.levels[0], &mut at)?;
         (1.0 / MOST_GAIN..MOST_GAIN).contains(&at.gain).then_some(at)
+    }
+
+    /// A rotation as it is, without a change of brightness.
+    pub fn of(&self, template: &Template, rotation: &Turned) -> Option<Estimate> {
+        let mut at = Estimate { rotation: *rotation, ..Estimate::START };
+        self.judge(&template.levels[0], &mut at)?;
+        Some(at)
     }
 
     /// The rotation by the finest level alone if it is supported by `expected`; otherwise by all levels, if that is

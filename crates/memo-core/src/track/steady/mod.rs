@@ -9,12 +9,15 @@
 //!    is chained with that of the key frame before.
 //! 4. If a frame and those after it agree with each other but not with the key frames, the shot has changed. If the focal
 //!    length changes, the picture is zoomed. Both end the view ([`Loss`]).
+//! 5. A rotation stands only if the camera of the first frame, unmoved, does not explain more: before faint texture it would
+//!    creep along with a person who has more of it.
 //!
 //! Limits: the camera only rotates. A camera that is carried along changes the perspective: near a wall it cannot be told
 //! from a rotation, and forwards it looks like a zoom. Without a calibration the rotation is that of the assumed field of
 //! view; a wrong one leaves part of a pan uncorrected towards the sides. A rolling shutter is not modelled.
 //! A fast zoom may be reported as a cut; before fine texture, a slow one may pass unnoticed. Before a wall of faint texture
-//! motions of several pixels per frame may be missed, because its coarse scales show nothing.
+//! motions of several pixels per frame may be missed, because its coarse scales show nothing, and somebody who covers a third of the
+//! picture may be taken for the wall.
 
 mod estimate;
 mod pyramid;
@@ -396,7 +399,22 @@ impl Steadier {
         };
         let first = || (nearest != 0 || self.is_lost).then(|| jumped(0, &DMat3::IDENTITY)).flatten();
         let near = of(nearest, &to(nearest)).or_else(|| jumped(nearest, &to(nearest)));
-        near.map(|estimate| (nearest, estimate)).or_else(|| first().map(|estimate| (0, estimate)))
+        let found =
+            near.map(|estimate| (nearest, estimate)).or_else(|| first().map(|estimate| (0, estimate)));
+        // In a picture of little texture, most of which is somebody's, the rotation creeps along with that person. Then the
+        // camera of the first frame explains more.
+        let still = found.and_then(|(key, found)| {
+            let turned = found.rotation * self.keys[key].turned;
+            let template = &self.keys[0].template;
+            if displacement_px(&view.camera, &turned)[0] < self.options.still_px {
+                return None;
+            }
+            let is_better = |a: &Estimate, b: &Estimate| a.support > b.support;
+            let still = comparison.of(template, &DMat3::IDENTITY).filter(|still| is_better(still, &found))?;
+            let near = comparison.estimate(template, &DMat3::IDENTITY, 1);
+            near.filter(|near| is_better(near, &still)).or(Some(still)).filter(good)
+        });
+        still.map(|still| (0, still)).or(found)
     }
 
     /// The key frame that looks nearest to where the camera last looked.

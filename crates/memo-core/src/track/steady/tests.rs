@@ -203,6 +203,27 @@ fn before_a_plain_wall_a_person_is_no_camera_motion() {
 }
 
 /// What a codec leaves on a plain wall differs from frame to frame; that is no texture and no cut.
+/// Before a wall of faint texture, many points of the first frame are those of a person, who moves on by 20 pixels.
+#[test]
+fn a_camera_at_rest_does_not_creep_along_with_a_person() {
+    let camera = camera();
+    for (width, contrast) in [(80.0, 0.4), (100.0, 0.5), (120.0, 0.5), (120.0, 0.6), (120.0, 0.8)] {
+        let mut steadier = steadier(Some(&camera));
+        for k in 0..40u32 {
+            let left = 60.0 + 0.5 * f64::from(k);
+            let person = |at: DVec2| {
+                let is_person = (left..left + width).contains(&at.x) && at.y > 15.0;
+                is_person.then(|| texture(9, at - DVec2::X * left, 5.0))
+            };
+            let wall = |at: DVec2| 120.0 + contrast * (texture(1, at, 7.0) - 120.0);
+            let shot = Shot { seed: 100 + k, noise: 1.5, ..Shot::of(&camera, [0.0; 3]) };
+            let picture = shot.drawn(|grey| grey, |at| person(at).or_else(|| Some(wall(at))));
+            let (_, motion) = pushed(&mut steadier, &picture);
+            assert!(motion.shift_px[0] < 1.5, "{width} {contrast} {k}: {motion:?}");
+        }
+    }
+}
+
 #[test]
 fn texture_that_is_another_in_every_frame_is_no_view() {
     let camera = camera();

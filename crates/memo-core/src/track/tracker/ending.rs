@@ -75,8 +75,12 @@ impl Tracker {
     /// 2. The person, fitted to all of them.
     /// 3. What is no walk, or a second model of somebody else, or has no legs of its own, is withdrawn.
     pub(super) fn end_walk(&mut self, active: Active) {
-        let mut active = if active.settled { active } else { self.begun_otherwise(active) };
+        let was_settled = active.settled;
+        let mut active = if was_settled { active } else { self.begun_otherwise(active) };
         let standing = self.complete(&mut active);
+        if !was_settled {
+            self.identify_again(&mut active);
+        }
         let walk_boxes = walk_boxes(&active);
         if !active.is_walk() {
             return self.withdraw(active.person, walk_boxes, Reason::NotWalking);

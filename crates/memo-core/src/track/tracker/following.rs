@@ -166,11 +166,13 @@ impl Tracker {
         let standing = std::mem::take(&mut self.standing);
         let active = &mut self.people[k];
         active.earlier = standing.before(active.kept.first().map_or(0, |(_, edges)| edges.frame));
-        let active = self.people.remove(k);
+        let mut active = self.people.remove(k);
         let (person, joined) = (active.person, self.gone_on(&active));
         // Two walks became one.
         if joined.is_some() {
             self.identities.withdraw(person);
+        } else {
+            self.identify_again(&mut active);
         }
         self.people.insert(k, joined.unwrap_or(active));
     }

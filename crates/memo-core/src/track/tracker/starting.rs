@@ -147,11 +147,24 @@ impl Tracker {
         person
     }
 
+    /// Asks again whose walk it is, once its path is settled: it starts as if it went across the picture. Somebody of another
+    /// given height stays.
+    pub(super) fn identify_again(&mut self, active: &mut Active) {
+        let (Some(start), person) = (active.sign_at(0), active.person) else { return };
+        let known = self.faded(&start).map(|n| self.fading[n].1.person);
+        let Some(known) = known.or_else(|| self.identities.known(&start)) else { return };
+        let is_new = person + 1 == self.identities.count() && known < person;
+        if is_new && self.given_height(known) == self.given_height(person) {
+            self.identities.withdraw(person);
+            active.person = self.identified(active);
+        }
+    }
+
     /// Which of the walks that are over leads to a start.
     fn faded(&self, start: &Sign) -> Option<usize> {
         // The old walk may have gone on for some frames while the person turned round.
         let stood = |end: Sign| Sign { time_s: end.time_s.min(start.time_s), ..end };
-        let end = |old: &Active| old.standing().map(stood).or_else(|| old.sign_before(start.time_s));
+        let end = |old: &Active| old.standing().map(stood).or_else(|| old.last_seen_before(start.time_s));
         self.fading.iter().position(|(_, old)| end(old).is_some_and(|end| end.leads_to(start)))
     }
 

@@ -678,6 +678,41 @@ fn who_is_found_again_keeps_the_number_if_the_walk_before_was_none() {
     assert_eq!(tracker.identities.appear(&stranger), 1);
 }
 
+/// A start on a curve goes across the picture at first; the settled path shows whose walk it is.
+#[test]
+fn whose_walk_it_is_is_asked_again_on_the_settled_path() {
+    for (turned_deg, height_m, number) in [(30.0, None, 0), (100.0, None, 1), (30.0, Some(1.6), 1)] {
+        let mut tracker = following(40, 0.0, 1.2);
+        tracker.options.further_heights_m = height_m.into_iter().collect();
+        let old = tracker.people.remove(0);
+        let end = old.sign_at(39).unwrap();
+        tracker.identities.end(0, end);
+        let mut new = old.clone();
+        let later_s = 0.4;
+        for twin in &mut new.walk.twins {
+            twin.steps
+                .iter_mut()
+                .for_each(|step| step.time_s += end.time_s - old.steps()[0].time_s + later_s);
+        }
+        let at = |turned_deg: f64| {
+            let path =
+                Path { origin: end.place_m, heading_rad: PATH.heading_rad + f64::to_radians(turned_deg) };
+            let first_m = old.steps()[0].state.along.position;
+            Path { origin: path.origin - path.direction() * (first_m - 1.2 * later_s), ..path }
+        };
+        new.walk.route = at(90.0).into();
+        new.person = tracker.identified(&new);
+        assert_eq!(new.person, 1);
+        new.walk.route = at(turned_deg).into();
+        tracker.identify_again(&mut new);
+        assert_eq!(
+            (new.person, tracker.identities.count()),
+            (number, number + 1),
+            "{turned_deg} {height_m:?}"
+        );
+    }
+}
+
 #[test]
 fn heights_change_places_only_for_who_is_new() {
     let order = |is_back: bool| {
