@@ -48,8 +48,8 @@ pub(in crate::track) const GLANCE_SHARE: f64 = 0.95;
 /// of these had more than 0.76. Of those with more than 0.85, a few had the other way in the end.
 pub(in crate::track) const OTHER_WAY_SHARE: f64 = 0.75;
 /// A walk starts if the feet are that much more likely (as the logarithm of the ratio) on a line of phase than on one
-/// of even motion. Nine drawn walks of four people reached 6 to 9 in the first 66 frames. Noise of five kinds about even motion,
-/// 60 draws each, reached 2.8 in 40 frames, 3.7 in 66 and -1.9 in 92; a saw-tooth at the rate of steps 8. One of the nine had 5.5 in
+/// of even motion. Eight drawn walks of three people reached 6 to 9 within 66 frames. Noise of five kinds about even motion,
+/// 60 draws each, reached 2.8 in 40 frames, 3.7 in 66 and -1.9 in 92; a saw-tooth at the rate of steps 8. One of the eight had 5.5 in
 /// 40 frames on a line that was 0.1 m/s too slow, and was lost.
 pub(in crate::track) const FRONTAL_GAIN: f64 = 6.0;
 /// The same of the feet before a walk started or after it was lost, whose steps are to go on as those of the walk. Chosen on

@@ -1,14 +1,15 @@
 //! Walking towards the camera or away from it.
 //!
 //! Seen along the path, the contours of all phases are nearly the same, so a search of the contours does not find the
-//! phase. The feet show it: the ray of the lowest changed row meets the ground at the foot that is nearer to the camera.
-//! With the place x along the path and the reach F of the model's nearer foot,
+//! phase. The feet show it: the ray of the lowest changed row meets the ground at the foot that is nearer to the camera,
+//! or, while that one stands and does not change, at the one that swings (`reach`). With the place x along the path and the
+//! reach F of the likelier foot of the model,
 //!
 //! f(t) = x(t) + F(x(t), phase(t)).
 //!
 //! 1. The path is the line through those points.
 //! 2. A walk starts on the line of phase whose steps leave the least of f, if they leave so much less than even motion
-//!    does that it is not one of many lines by chance.
+//!    does that it is not one of many lines by chance (`rhythm`).
 //! 3. Place and phase of every frame, with slowly changing speed and cadence, are solved for by Gauss and Newton's
 //!    method.
 //! 4. When the walk is over, the path is the line through the feet of all its frames, on which they are followed again.

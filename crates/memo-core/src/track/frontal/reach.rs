@@ -19,15 +19,15 @@ pub(super) const LEAD: [f64; 2] = [0.12, -0.15];
 /// By so many lengths of the foot the lowest changes are ahead of the ankle of who comes nearer, if they are all changes, and
 /// nearer to the camera than that of who goes away. Firm changes do not show the tip of a shoe that comes nearer. Measured on
 /// people drawn by two programs, in the mean of a walk: of who comes nearer, 1.05 (13 people of the one, 0.7 to 1.4) and about
-/// 0.75 (two of the other); of who goes away, 24 walks of four people are -0.07 to 0.13 m off along the path with it, and ten of
-/// five others -0.09 to 0.03 m.
+/// 0.75 (read off the lowest rows of four walks of two people of the other); of who goes away, 24 walks of four people are -0.07
+/// to 0.13 m off along the path with it, and ten of five others -0.09 to 0.03 m.
 const SHOE: [f64; 2] = [0.9, -1.25];
 
 /// How far the lowest changes are off the reach of a nearer and of a swinging foot, the scales of Cauchy's distribution, metres.
 pub(super) const NEARER_OFF_M: f64 = 0.06;
 const SWINGING_OFF_M: f64 = 0.12;
 /// From and up to which phase after its contact, as the lowest changes show it, a foot has stood so long that the swinging one is
-/// seen, in so many of the frames; elsewhere in so many. Of four drawn people who come nearer, 0.8 to 1.0 and none.
+/// seen, in so many of the frames; elsewhere in so many. Of four drawn walks of two people who come nearer, about 0.8 and 0.02.
 const STANDS: std::ops::Range<f64> = 0.08..0.27;
 const SWINGS: [f64; 2] = [0.75, 0.03];
 
