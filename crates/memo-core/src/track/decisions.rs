@@ -192,7 +192,7 @@ pub(in crate::track) const WELL_LENGTH_SD: f64 = 3.0;
 /// Feet farther from the ground, metres, do not stand on it. Drawn walks: up to 0.01.
 pub(in crate::track) const MOST_SOLE_M: f64 = 0.05;
 /// Hip, knee, ankle, shoulder and elbow with a larger standard deviation were not measured.
-pub(in crate::track) const MOST_SD_RAD: [f64; 5] = [0.10, 0.12, 0.12, 0.16, 0.17];
+pub(in crate::track) const MOST_SD_RAD: [f64; 5] = [0.10, 0.12, 0.14, 0.16, 0.17];
 
 // How sure it is: sides.
 /// Log odds per unit of evidence.
@@ -211,7 +211,7 @@ pub(in crate::track) const SIDES_LOST: f64 = 3.0;
 /// 88 % of the mean errors of 28 drawn walks are within 1.64 of what is stated. The height of the torso is 1 to 10 cm too
 /// large for nine drawn people, 4.6 cm in root mean square over them, because their shoulders are lower than the model's.
 pub(in crate::track) const SD_FACTOR: f64 = 1.3;
-pub(in crate::track) const MODEL_SD_RAD: [f64; 5] = [0.012, 0.017, 0.05, 0.10, 0.12];
+pub(in crate::track) const MODEL_SD_RAD: [f64; 5] = [0.012, 0.017, 0.08, 0.10, 0.12];
 pub(in crate::track) const FIT_PLACE_SD: [f64; 4] = [0.005, 0.02, 0.045, 0.012];
 /// Where the outline is missed, what is found beside it is often something else: standard deviations per share of the
 /// outline that is missed beyond `Seen::USUALLY_MISSED`. Low-contrast clothes miss 3 to 8 %, and hip and distance are

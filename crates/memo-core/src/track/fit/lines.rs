@@ -65,6 +65,9 @@ pub struct Workspace {
     pub profile: Profile,
 }
 
+/// Number of kinds of parts.
+pub const KINDS: usize = 8;
+
 /// The kind of a part: the row of its thickness in the body's table.
 pub fn row_of(part: Part) -> usize {
     match part {

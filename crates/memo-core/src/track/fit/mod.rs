@@ -21,6 +21,7 @@
 
 pub mod belt;
 pub mod contacts;
+mod contrast;
 pub(crate) mod edge_search;
 mod headings;
 mod lines;

@@ -227,6 +227,27 @@ fn places_and_phases_change_their_speed_little_from_frame_to_frame() {
 }
 
 /// A sample of the upright side of a part.
+/// Where the edges show nothing, legs are long or short as a whole.
+#[test]
+fn thigh_and_shank_differ_less_than_legs() {
+    let Drawn { camera, walker, route, frames } = drawn();
+    let options = FitOptions::default();
+    let problem = Problem::new(&camera, &walker, &route, &frames, &options);
+    let start = problem.start(0.0);
+    let mut arrow = Arrow::new(frames.len(), FRAME, WHOLE);
+    problem.add_priors(&start, FRAME, &mut arrow);
+    for frame in 0..frames.len() {
+        (0..FRAME_ANGLES).for_each(|unknown| arrow.add_row(&[(arrow.index(frame, unknown), 1.0)], 0.0, 1.0));
+    }
+    let covariance = arrow.solve().unwrap().covariance();
+    let sd = |shank: f64| covariance.variance(&[(THIGH, 1.0), (SHANK, shank)], &[]).sqrt();
+    let [thigh, of_shank] = [THIGH, SHANK].map(|at| problem.priors[at].sd);
+    let expected = (thigh.hypot(of_shank).powi(-2) + THIGH_OVER_SHANK.sd.powi(-2)).recip().sqrt();
+    assert!((sd(-1.0) - expected).abs() < 1e-9, "{} {expected}", sd(-1.0));
+    // The mean is that of the average walker.
+    assert!((problem.priors[THIGH].mean - problem.priors[SHANK].mean - THIGH_OVER_SHANK.mean).abs() < 1e-12);
+}
+
 fn sample(part: Part, is_outer: bool) -> Sample {
     Sample {
         part,
