@@ -69,7 +69,6 @@ mod tests {
             point_px: DVec2::new(49.5, 10.0),
             normal: DVec2::X,
             is_outer,
-            is_free: is_outer,
             world: DVec3::ZERO,
             radius: DVec3::X,
             z: 0.0,

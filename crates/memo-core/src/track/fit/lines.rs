@@ -42,8 +42,6 @@ pub struct Sample {
     pub normal: DVec2,
     /// Whether the background lies beyond it, and not another part.
     pub is_outer: bool,
-    /// Whether there is no other part, of anybody, a little farther out either.
-    pub is_free: bool,
     /// The point of the surface, metres.
     pub world: DVec3,
     /// From the axis of the part to the surface, without taper; 0 at an end of the part.
@@ -114,13 +112,13 @@ const CROWN_PART: f64 = 0.5;
 const RIM_CHORDS: usize = 12;
 
 /// Writes sample points into the workspace, about `spacing_px` apart. The bodies of other people hide contours, and a
-/// contour before or beside them does not border on the background, or only on a strip of it of less than `free_px`.
+/// contour before or beside them does not border on the background.
 pub fn samples(
     figure: &Figure,
     others: &[EllipticCylinder],
     camera: &Camera,
     whole: &[f64],
-    [spacing_px, free_px]: [f64; 2],
+    spacing_px: f64,
     work: &mut Workspace,
 ) {
     let Workspace { view, visible, outlines, near, samples, .. } = work;
@@ -137,28 +135,17 @@ pub fn samples(
         let first = samples.len();
         let on_cylinder = |n: usize| segment.start.lerp(segment.end, (n as f64 + 0.5) / count as f64);
         samples.extend((0..count).filter_map(|n| line.sample(on_cylinder(n), camera)));
-        let beyond_px = [0.75 * spacing_px, 0.5 * free_px, free_px];
-        let beyond = |sample: &Sample, px: f64| sample.point_px + px * sample.normal;
-        let all = |most: fn(DVec2, DVec2) -> DVec2| {
-            let ends = |sample: &Sample| {
-                let [a, _, b] = beyond_px.map(|px| beyond(sample, px));
-                most(a, b)
-            };
-            samples[first..].iter().map(ends).reduce(most)
-        };
-        let [low, high] = [DVec2::min, DVec2::max].map(all);
+        let beyond = |sample: &Sample| sample.point_px + 0.75 * spacing_px * sample.normal;
+        let [low, high] =
+            [DVec2::min, DVec2::max].map(|most| samples[first..].iter().map(beyond).reduce(most));
         let Some((low, high)) = low.zip(high) else { continue };
         let beside = outlines.iter().enumerate().filter(|(other, _)| *other != segment.part);
         near.clear();
         near.extend(beside.filter_map(|(n, outline)| outline.as_ref()?.meets(low, high).then_some(n)));
         for sample in &mut samples[first..] {
-            let is_covered = |px: f64| {
-                let point = beyond(sample, px);
-                near.iter().any(|&n| outlines[n].as_ref().is_some_and(|outline| outline.contains(point)))
-            };
-            let [beside, between, farther] = beyond_px;
-            (sample.is_outer, sample.is_free) =
-                (!is_covered(beside), !is_covered(between) && !is_covered(farther));
+            let point = beyond(sample);
+            let covers = |&n: &usize| outlines[n].as_ref().is_some_and(|outline| outline.contains(point));
+            sample.is_outer = !near.iter().any(covers);
         }
     }
 }
@@ -232,17 +219,7 @@ impl<'a> Line<'a> {
         let radius = if self.is_rim { DVec3::ZERO } else { radius };
         let point_px = camera.project(world)?;
         let (normal, taper) = (self.normal, self.taper);
-        Some(Sample {
-            part: self.part,
-            point_px,
-            normal,
-            is_outer: true,
-            is_free: true,
-            world,
-            radius,
-            z,
-            taper,
-        })
+        Some(Sample { part: self.part, point_px, normal, is_outer: true, world, radius, z, taper })
     }
 }
 
@@ -463,7 +440,7 @@ mod tests {
         let mut work = Workspace::default();
         let mut whole = q[BODY..].to_vec();
         whole.resize(WHOLE, 0.0);
-        samples(&figure(q), &[], &camera(), &whole, [spacing_px, 0.0], &mut work);
+        samples(&figure(q), &[], &camera(), &whole, spacing_px, &mut work);
         work.samples
     }
 
@@ -534,53 +511,6 @@ mod tests {
         ] {
             assert!(seen[coordinate] > 0, "{coordinate}");
         }
-    }
-
-    /// Whether a ray from the eye meets a part that is larger by a factor: marched, in steps of 5 mm.
-    fn is_met(cylinder: &EllipticCylinder, eye: DVec3, ray: DVec3, larger: f64) -> bool {
-        let inwards = cylinder.world_from_cylinder.inverse();
-        (400..1600).map(|k| eye + 0.005 * f64::from(k) * ray).any(|point| {
-            let at = inwards.transform_point3(point);
-            let across = at.truncate() / (larger * cylinder.semi_axes);
-            across.length() < 1.0 && at.z.abs() < larger * cylinder.half_length
-        })
-    }
-
-    /// Beside a person stands another one. Where rays beyond an outline meet a part of either, it is not free.
-    #[test]
-    fn nothing_is_beside_a_free_outline() {
-        let (q, camera, free_px) = (coordinates(), camera(), 9.0);
-        let [this, other] = [0.0, 0.35].map(|beside| {
-            let mut q = q.clone();
-            q[ALONG] += beside;
-            figure(&q)
-        });
-        let (mut work, mut whole) = (Workspace::default(), q[BODY..].to_vec());
-        whole.resize(WHOLE, 0.0);
-        samples(&this, &other.posed.cylinders, &camera, &whole, [1.0, free_px], &mut work);
-        let mut counts = [0, 0];
-        for sample in work.samples.iter().filter(|sample| sample.is_outer) {
-            let rays = [0.5, 1.0].map(|share| {
-                camera.ray_in_world(sample.point_px + share * free_px * sample.normal).normalize()
-            });
-            let others = this.posed.cylinders.iter().enumerate().filter(|(n, _)| *n != sample.part as usize);
-            let all: Vec<_> = others.map(|(_, part)| part).chain(&other.posed.cylinders).collect();
-            let meets = |larger: f64| {
-                let is_hit = |&part: &&EllipticCylinder| {
-                    rays.iter().any(|&ray| is_met(part, camera.position(), ray, larger))
-                };
-                all.iter().any(is_hit)
-            };
-            // Near a border, the outline by chords decides.
-            if meets(0.8) {
-                assert!(!sample.is_free, "{sample:?}");
-                counts[0] += 1;
-            } else if !meets(1.2) {
-                assert!(sample.is_free, "{sample:?}");
-                counts[1] += 1;
-            }
-        }
-        assert!(counts.iter().all(|&count| count > 20), "{counts:?}");
     }
 
     #[test]

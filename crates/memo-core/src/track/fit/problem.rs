@@ -200,12 +200,12 @@ impl<'a> Problem<'a> {
         let mut contrast = Contrast::default();
         let start = self.start(0.0);
         let Some(height_px) = self.height_px(&start) else { return contrast };
-        let apart_px = Width::of_step(0, height_px).apart_px();
+        let spacing_px = Width::of_step(0, height_px).spacing_px();
         let mut work = Workspace::default();
         for frame in (0..self.frames.len()).step_by(self.frames.len().div_ceil(FEW_FRAMES)) {
             let view = &self.frames[frame].view;
             let figure = self.figure(&start, frame);
-            samples(&figure, &view.others, self.camera, &start.whole, apart_px, &mut work);
+            samples(&figure, &view.others, self.camera, &start.whole, spacing_px, &mut work);
             work.samples.iter().for_each(|sample| contrast.add(sample, view, height_px));
         }
         contrast
@@ -521,17 +521,14 @@ impl<'a> Problem<'a> {
         let figure = self.figure(unknowns, frame);
         let work = &mut room.work;
         let view = &self.frames[frame].view;
-        samples(&figure, &view.others, self.camera, &unknowns.whole, width.apart_px(), work);
+        samples(&figure, &view.others, self.camera, &unknowns.whole, width.spacing_px(), work);
         let mut terms = FigureTerms::new();
         let mut seen = Seen::default();
         let Workspace { samples, motion, profile, .. } = work;
         for sample in samples.iter() {
-            // Beyond a sole lies the shadow of the shoe.
-            let borders_on_empty = sample.is_free && !is_sole(sample);
-            let border = match (sample.is_outer, borders_on_empty) {
-                (true, true) => Border::Outer { body_level: self.body_levels[row_of(sample.part)] },
-                (true, false) => Border::Outer { body_level: f32::INFINITY },
-                (false, _) => Border::Inner,
+            let border = match sample.is_outer {
+                true => Border::Outer { body_level: self.body_levels[row_of(sample.part)] },
+                false => Border::Inner,
             };
             let Some(edge) = view.search(sample.point_px, sample.normal, &width.reach, border, profile)
             else {
@@ -577,7 +574,6 @@ impl<'a> Problem<'a> {
             point_px,
             normal: DVec2::NEG_Y,
             is_outer: true,
-            is_free: true,
             world,
             radius: DVec3::ZERO,
             z: 1.0,
@@ -646,9 +642,8 @@ impl Width {
         Self { reach, scale_px: at(SCALE).max(1.0), height_px, sole: 1.0 }
     }
 
-    /// From sample to sample, and how far the background reaches beyond a free one.
-    fn apart_px(&self) -> [f64; 2] {
-        [(self.height_px / SAMPLES_PER_HEIGHT).max(LEAST_SPACING_PX), BEYOND * self.height_px]
+    fn spacing_px(&self) -> f64 {
+        (self.height_px / SAMPLES_PER_HEIGHT).max(LEAST_SPACING_PX)
     }
 
     /// Standard deviation of the edge of one sample.

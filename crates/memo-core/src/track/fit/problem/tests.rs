@@ -193,12 +193,12 @@ fn a_body_close_to_the_camera_has_no_more_samples_than_the_picture_has_room_for(
     unknowns.frames[10][FRAME_ALONG] += to_eye.dot(ahead);
     // Both sides of each part, from end to end of the picture.
     let [columns, rows] = camera.size.map(f64::from);
-    let most = 2.0 * 14.0 * columns.hypot(rows) / width.apart_px()[0];
+    let most = 2.0 * 14.0 * columns.hypot(rows) / width.spacing_px();
     let mut work = Workspace::default();
     for mm in -400..400 {
         unknowns.whole[WHOLE_ACROSS] = to_eye.dot(ahead.perp()) + 0.001 * f64::from(mm);
         let figure = problem.figure(&unknowns, 10);
-        samples(&figure, &[], &camera, &unknowns.whole, width.apart_px(), &mut work);
+        samples(&figure, &[], &camera, &unknowns.whole, width.spacing_px(), &mut work);
         assert!(work.samples.len() as f64 <= most, "{mm} mm: {}", work.samples.len());
     }
 }
@@ -254,7 +254,6 @@ fn sample(part: Part, is_outer: bool) -> Sample {
         point_px: DVec2::ZERO,
         normal: DVec2::X,
         is_outer,
-        is_free: is_outer,
         world: DVec3::ZERO,
         radius: DVec3::Y,
         z: 0.0,
