@@ -214,9 +214,9 @@ pub(in crate::track) const SD_FACTOR: f64 = 1.3;
 pub(in crate::track) const MODEL_SD_RAD: [f64; 5] = [0.012, 0.017, 0.08, 0.10, 0.12];
 pub(in crate::track) const FIT_PLACE_SD: [f64; 4] = [0.005, 0.02, 0.045, 0.012];
 /// Where the outline is missed, what is found beside it is often something else: standard deviations per share of the
-/// outline that is missed beyond `Seen::USUALLY_MISSED`. Low-contrast clothes miss 3 to 8 %, and hip and distance are
-/// 2 to 7 degrees and up to 30 cm off.
-pub(in crate::track) const OFF_SD_RAD: f64 = 1.2;
+/// outline that is missed beyond `Seen::USUALLY_MISSED`. Low-contrast clothes miss 3 to 10 %, and hip and distance are
+/// 2 to 3 degrees and up to 30 cm off.
+pub(in crate::track) const OFF_SD_RAD: f64 = 0.9;
 pub(in crate::track) const OFF_ACROSS_SD_M: f64 = 5.0;
 /// Standard deviation to add to that of a fitted body height, metres: hair, soles, and heads that are no cylinders.
 pub(in crate::track) const HEIGHT_MODEL_SD_M: f64 = 0.015;
