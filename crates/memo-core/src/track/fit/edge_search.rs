@@ -105,12 +105,13 @@ impl View {
         pixels
     }
 
-    /// The difference from the empty scene in the pixel of a point, grey levels; `None` outside of the piece.
+    /// The difference from the empty scene in the pixel of a point, grey levels; `None` outside of the piece, or if the empty
+    /// scene was never seen.
     pub fn unlike_at(&self, point: DVec2) -> Option<f64> {
         let at = (point - DVec2::new(self.corner[0] as f64, self.corner[1] as f64)).round();
         let size = DVec2::new(self.pixels.width() as f64, self.pixels.height() as f64);
-        let is_inside = at.cmpge(DVec2::ZERO).all() && at.cmplt(size).all();
-        let [seen, behind] = is_inside.then(|| self.pixels.row(at.y as usize)[at.x as usize])?;
+        let is_shown = self.is_empty_known && at.cmpge(DVec2::ZERO).all() && at.cmplt(size).all();
+        let [seen, behind] = is_shown.then(|| self.pixels.row(at.y as usize)[at.x as usize])?;
         Some(f64::from(seen.abs_diff(behind)))
     }
 
@@ -367,6 +368,8 @@ mod tests {
         assert!(
             [(-0.6, 3.0), (60.0, 3.0), (3.0, 40.0), (f64::NAN, 3.0)].iter().all(|&(x, y)| at(x, y).is_none())
         );
+        let alone = View { is_empty_known: false, ..view };
+        assert_eq!(alone.unlike_at(DVec2::new(130.4, 50.0)), None);
     }
 
     #[test]

@@ -226,7 +226,6 @@ fn places_and_phases_change_their_speed_little_from_frame_to_frame() {
     }
 }
 
-/// A sample of the upright side of a part.
 /// Where the edges show nothing, legs are long or short as a whole.
 #[test]
 fn thigh_and_shank_differ_less_than_legs() {
@@ -248,6 +247,7 @@ fn thigh_and_shank_differ_less_than_legs() {
     assert!((problem.priors[THIGH].mean - problem.priors[SHANK].mean - THIGH_OVER_SHANK.mean).abs() < 1e-12);
 }
 
+/// A sample of the upright side of a part.
 fn sample(part: Part, is_outer: bool) -> Sample {
     Sample {
         part,
