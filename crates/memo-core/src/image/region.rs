@@ -139,6 +139,11 @@ impl Region {
         Self { runs, rectangle, area }
     }
 
+    /// Regions that do not overlap, as one; `None` without any.
+    pub(crate) fn of_parts(parts: Vec<Self>) -> Option<Self> {
+        (!parts.is_empty()).then(|| Self::from_runs(parts.into_iter().flat_map(|part| part.runs).collect()))
+    }
+
     /// Whether a pixel belongs to the region.
     pub fn contains(&self, x: usize, y: usize) -> bool {
         let after = self.runs.partition_point(|run| (run.y, run.start) <= (y, x));

@@ -18,6 +18,8 @@ const MOST_CANDIDATES: usize = 8;
 const APART_FRAMES: usize = 4;
 /// A box belongs to somebody who is followed if it overlaps the body's box by this, intersection over union.
 const OWN_BOX: f64 = 0.3;
+/// A region is a part of a candidate that was seen before if so much of it is where that was.
+const PART_OVERLAP: f64 = 0.5;
 
 impl Tracker {
     /// Adds the regions that nobody explains to the candidates, and starts those that walk.
@@ -103,7 +105,9 @@ impl Tracker {
         }
         let group: &GroupOptions = &self.options.evidence.group;
         let parts = regions(&mask, group.min_part_area);
-        Moving::new(group_regions_of(&parts, &with_small_ones(group), |r| self.can_be_one(r)), group)
+        let found = group_regions_of(&parts, &with_small_ones(group), |r| self.can_be_one(r));
+        let before = self.candidates.iter().filter_map(Candidate::last_rectangle);
+        Moving::new(whole_again(found, before, |r| self.can_be_one(r)), group)
     }
 
     /// Regions divided where people have been side by side for some frames, largest first.
@@ -166,5 +170,77 @@ impl Tracker {
         let mut boxes: Vec<Rectangle> = given.iter().map(place).collect();
         boxes.sort_by_key(|r| std::cmp::Reverse(r.width() * r.height()));
         Some(boxes)
+    }
+}
+
+/// Joins regions that somebody in front divides, the largest first: they are where a candidate was before, and only together
+/// as tall.
+fn whole_again(
+    mut regions: Vec<Region>,
+    before: impl IntoIterator<Item = Rectangle>,
+    can_be_one: impl Fn(&Rectangle) -> bool,
+) -> Vec<Region> {
+    for last in before {
+        let is_it = |region: &Region| same_person(&last, &region.rectangle);
+        if regions.iter().any(is_it) {
+            continue;
+        }
+        let place = last.sides(0.0);
+        let is_part = |region: &Region| region.rectangle.sides(0.0).overlap_of_smaller(&place) > PART_OVERLAP;
+        let (parts, mut others): (Vec<Region>, Vec<Region>) = regions.iter().cloned().partition(is_part);
+        let whole = Region::of_parts(parts);
+        if let Some(whole) = whole.filter(|whole| is_it(whole) && can_be_one(&whole.rectangle)) {
+            others.push(whole);
+            regions = others;
+        }
+    }
+    regions.sort_by_key(|region| std::cmp::Reverse(region.area));
+    regions
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::Image;
+
+    /// Rectangles of changes; no two touch.
+    fn found(rectangles: &[[usize; 4]]) -> Vec<Region> {
+        let mut mask: Mask = Image::filled(200, 200, false);
+        for &[left, top, right, bottom] in rectangles {
+            (top..=bottom).for_each(|y| mask.row_mut(y)[left..=right].fill(true));
+        }
+        regions(&mask, 1)
+    }
+
+    fn boxed([left, top, right, bottom]: [usize; 4]) -> Rectangle {
+        Rectangle { left, top, right, bottom }
+    }
+
+    const HEAD: [usize; 4] = [60, 20, 75, 40];
+    const LEGS: [usize; 4] = [50, 100, 80, 159];
+    const WHOLE: [usize; 4] = [50, 20, 80, 159];
+
+    #[test]
+    fn head_and_legs_beside_somebody_in_front_are_one_person_where_one_was_before() {
+        let beside = [120, 90, 150, 159];
+        let all = found(&[HEAD, LEGS, beside]);
+        let boxes = |regions: Vec<Region>| regions.iter().map(|r| r.rectangle).collect::<Vec<_>>();
+        let was = boxed([46, 22, 77, 158]);
+        let joined = whole_again(all.clone(), [was], |_| true);
+        assert_eq!(boxes(joined.clone()), [boxed(WHOLE), boxed(beside)]);
+        let area = |regions: &[Region]| regions.iter().map(|r| r.area).sum::<usize>();
+        assert_eq!(area(&joined), area(&all));
+
+        let apart = boxes(all.clone());
+        let elsewhere = boxed([150, 22, 190, 158]);
+        assert_eq!(boxes(whole_again(all.clone(), [elsewhere], |_| true)), apart);
+        assert_eq!(boxes(whole_again(all.clone(), [], |_| true)), apart, "nobody was seen before");
+        assert_eq!(boxes(whole_again(all, [was], |r| r.height() < 120)), apart, "too tall for one");
+    }
+
+    #[test]
+    fn what_is_as_tall_alone_takes_nothing_in() {
+        let all = found(&[[50, 20, 80, 120], [55, 130, 75, 159]]);
+        assert_eq!(whole_again(all.clone(), [boxed(WHOLE)], |_| true), all);
     }
 }
