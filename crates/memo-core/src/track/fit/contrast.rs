@@ -31,7 +31,7 @@ impl Contrast {
     pub fn add(&mut self, sample: &Sample, view: &View, height_px: f64) {
         let unlike = |share: f64| view.unlike_at(sample.point_px + share * height_px * sample.normal);
         if let (true, Some(inside), Some(outside)) = (sample.is_outer, unlike(-INSIDE), unlike(OUTSIDE)) {
-            let [count, inside_log, outside_log] = &mut self.sums[row_of(sample.part)];
+            let [count, inside_log, outside_log] = &mut self.sums[row_of(sample.point.part)];
             *count += 1.0;
             *inside_log += inside.ln_1p();
             *outside_log += outside.ln_1p();
@@ -51,6 +51,7 @@ impl Contrast {
 
 #[cfg(test)]
 mod tests {
+    use super::super::lines::SurfacePoint;
     use super::*;
     use crate::image::Image;
     use crate::model::body::Part;
@@ -64,16 +65,8 @@ mod tests {
     }
 
     fn sample(part: Part, is_outer: bool) -> Sample {
-        Sample {
-            part,
-            point_px: DVec2::new(49.5, 10.0),
-            normal: DVec2::X,
-            is_outer,
-            world: DVec3::ZERO,
-            radius: DVec3::X,
-            z: 0.0,
-            taper: 0.0,
-        }
+        let point = SurfacePoint { part, world: DVec3::ZERO, radius: DVec3::X, z: 0.0, taper: 0.0 };
+        Sample { point, point_px: DVec2::new(49.5, 10.0), normal: DVec2::X, is_outer }
     }
 
     #[test]

@@ -32,17 +32,11 @@ pub struct Figure {
     pub origin: DVec2,
 }
 
-/// A point on a visible contour.
+/// A point on the surface of a part.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Sample {
+pub struct SurfacePoint {
     pub part: Part,
-    /// In the image, pixels.
-    pub point_px: DVec2,
-    /// Unit normal in the image, outwards.
-    pub normal: DVec2,
-    /// Whether the background lies beyond it, and not another part.
-    pub is_outer: bool,
-    /// The point of the surface, metres.
+    /// Where it is, metres.
     pub world: DVec3,
     /// From the axis of the part to the surface, without taper; 0 at an end of the part.
     pub radius: DVec3,
@@ -50,6 +44,18 @@ pub struct Sample {
     pub z: f64,
     /// The taper of the part.
     pub taper: f64,
+}
+
+/// A point on a visible contour.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sample {
+    pub point: SurfacePoint,
+    /// In the image, pixels.
+    pub point_px: DVec2,
+    /// Unit normal in the image, outwards.
+    pub normal: DVec2,
+    /// Whether the background lies beyond it, and not another part.
+    pub is_outer: bool,
 }
 
 /// What [`samples`] needs again and again.
@@ -219,7 +225,8 @@ impl<'a> Line<'a> {
         let radius = if self.is_rim { DVec3::ZERO } else { radius };
         let point_px = camera.project(world)?;
         let (normal, taper) = (self.normal, self.taper);
-        Some(Sample { part: self.part, point_px, normal, is_outer: true, world, radius, z, taper })
+        let point = SurfacePoint { part: self.part, world, radius, z, taper };
+        Some(Sample { point, point_px, normal, is_outer: true })
     }
 }
 
@@ -259,20 +266,20 @@ impl Outline {
 }
 
 impl Figure {
-    /// Writes ∂X/∂q of a sample for every coordinate q of the figure on which it depends.
-    pub fn motion(&self, sample: &Sample, out: &mut Vec<(usize, DVec3)>) {
+    /// Writes ∂X/∂q of a point of the surface for every coordinate q of the figure on which it depends.
+    pub fn motion(&self, point: &SurfacePoint, out: &mut Vec<(usize, DVec3)>) {
         out.clear();
         let (ahead, left) = (self.ahead.extend(0.0), self.ahead.perp().extend(0.0));
-        let x = sample.world;
+        let x = point.world;
         out.extend([
             (ALONG, ahead),
             (ACROSS, left),
             (HEIGHT, DVec3::Z),
             (HEADING, DVec3::Z.cross(x - self.origin.extend(0.0))),
-            (BODY + WIDTHS + row_of(sample.part), sample.radius * (1.0 + sample.taper * sample.z)),
+            (BODY + WIDTHS + row_of(point.part), point.radius * (1.0 + point.taper * point.z)),
         ]);
-        out.extend(taper_of(sample.part).map(|taper| (BODY + TAPERS + taper, sample.radius * sample.z)));
-        if sample.part.is_leg() { self.leg_motion(sample, out) } else { self.trunk_motion(sample, out) }
+        out.extend(taper_of(point.part).map(|taper| (BODY + TAPERS + taper, point.radius * point.z)));
+        if point.part.is_leg() { self.leg_motion(point, out) } else { self.trunk_motion(point, out) }
     }
 
     fn axes(&self, part: usize) -> DMat3 {
@@ -280,14 +287,14 @@ impl Figure {
     }
 
     /// Trunk, head and arms turn with the lean about the hips and rise with the length of the torso.
-    fn trunk_motion(&self, sample: &Sample, out: &mut Vec<(usize, DVec3)>) {
-        let (row, height_m) = (row_of(sample.part), self.body.height_m);
+    fn trunk_motion(&self, point: &SurfacePoint, out: &mut Vec<(usize, DVec3)>) {
+        let (row, height_m) = (row_of(point.part), self.body.height_m);
         let left = self.ahead.perp().extend(0.0);
         let trunk = self.axes(Part::Torso as usize);
         // Share of the part from its upper end down, 0 to 1.
-        let down = 0.5 * (1.0 - sample.z);
+        let down = 0.5 * (1.0 - point.z);
         let share = if row == 1 { 1.0 - down } else { 1.0 };
-        out.push((LEAN, left.cross(sample.world - self.pelvis)));
+        out.push((LEAN, left.cross(point.world - self.pelvis)));
         out.push((BODY + TORSO, trunk.z_axis * (height_m * share)));
         if row == 0 {
             out.push((BODY + CROWN, trunk.z_axis * (height_m * (1.0 - down))));
@@ -296,38 +303,39 @@ impl Figure {
         if row < 2 {
             return;
         }
-        let side = side_of(sample.part);
+        let side = side_of(point.part);
         let (joints, outwards) =
             if side == 0 { (&self.posed.right, -left) } else { (&self.posed.left, left) };
         let upper = if side == 0 { Part::RightUpperArm } else { Part::LeftUpperArm } as usize;
         let angle = |joint: usize| ANGLES + side * JOINTS + joint;
-        let bend = self.axes(sample.part as usize).y_axis;
+        let bend = self.axes(point.part as usize).y_axis;
         out.push((BODY + SHOULDER_WIDTH, outwards * height_m));
-        out.push((angle(3), -bend.cross(sample.world - joints.shoulder)));
+        out.push((angle(3), -bend.cross(point.world - joints.shoulder)));
         let share = if row == 2 { down } else { 1.0 };
         out.push((BODY + UPPER_ARM, -self.axes(upper).z_axis * (height_m * share)));
         if row >= 3 {
             let share = if row == 3 { down } else { 1.0 };
-            out.push((angle(4), -bend.cross(sample.world - joints.elbow)));
+            out.push((angle(4), -bend.cross(point.world - joints.elbow)));
             out.push((BODY + FOREARM, -self.axes(upper + 1).z_axis * (height_m * share)));
         }
     }
 
     /// Legs turn about the hips, which the pelvis carries along.
-    fn leg_motion(&self, sample: &Sample, out: &mut Vec<(usize, DVec3)>) {
-        let (row, height_m) = (row_of(sample.part), self.body.height_m);
+    fn leg_motion(&self, point: &SurfacePoint, out: &mut Vec<(usize, DVec3)>) {
+        let (row, height_m) = (row_of(point.part), self.body.height_m);
         let ahead = self.ahead.extend(0.0);
-        let down = 0.5 * (1.0 - sample.z);
-        let side = side_of(sample.part);
+        let down = 0.5 * (1.0 - point.z);
+        let side = side_of(point.part);
         let (joints, sign) = if side == 0 { (&self.posed.right, -1.0) } else { (&self.posed.left, 1.0) };
         let thigh = if side == 0 { Part::RightThigh } else { Part::LeftThigh } as usize;
         let angle = |joint: usize| ANGLES + side * JOINTS + joint;
-        let axes = self.axes(sample.part as usize);
-        let (bend, bend_of_thigh, x) = (axes.y_axis, self.axes(thigh).y_axis, sample.world);
+        let axes = self.axes(point.part as usize);
+        let (bend, bend_of_thigh, x) = (axes.y_axis, self.axes(thigh).y_axis, point.world);
         // What turns about the hip moves shank and foot as far as the knee.
         let thigh_point = if row == 5 { x } else { joints.knee };
         let hip = joints.hip - self.pelvis;
-        out.push((PELVIS, DVec3::Z.cross(hip)));
+        out.push((LEAN, self.ahead.perp().extend(0.0).cross(hip)));
+        out.push((PELVIS, self.axes(Part::Torso as usize).z_axis.cross(hip)));
         out.push((BODY + HIP_WIDTH, hip / self.body.proportions.hip_half_width));
         out.push((TILTS + side * LEG, sign * ahead.cross(thigh_point - joints.hip)));
         out.push((angle(0), -bend_of_thigh.cross(thigh_point - joints.hip) - bend.cross(x - thigh_point)));
@@ -347,43 +355,31 @@ impl Figure {
             out.push((BODY + HEEL, -axes.z_axis * height_m));
             out.push((BODY + ANKLE, sole * height_m));
             // The sole stays where it is when the foot is thicker, and the axis rises.
-            let thickness = self.posed.cylinders[sample.part as usize].semi_axes.x;
+            let thickness = self.posed.cylinders[point.part as usize].semi_axes.x;
             out.push((BODY + WIDTHS + 7, -sole * thickness));
         }
     }
 
-    /// The lowest point of the lower foot: the heel, or the ball under the toes, and which it is.
-    pub fn lowest_point(&self) -> (usize, DVec3) {
+    /// The lowest point of the lower foot: under the heel, or under the ball of the toes.
+    pub fn lowest_point(&self) -> SurfacePoint {
         let side = usize::from(self.posed.left.ankle.z < self.posed.right.ankle.z);
         let [heel, ball] = [-1.0, BALL].map(|share| self.sole(side, share));
-        (side, if heel.z < ball.z { heel } else { ball })
+        if heel.world.z < ball.world.z { heel } else { ball }
     }
 
     /// The point of a sole below a place on the foot's axis, from -1 at the heel to 1 at the tip of the toes.
-    pub fn sole(&self, side: usize, share: f64) -> DVec3 {
+    fn sole(&self, side: usize, share: f64) -> SurfacePoint {
         let part = if side == 0 { Part::RightFoot } else { Part::LeftFoot };
         let foot = &self.posed.cylinders[part as usize];
         let axes = foot.world_from_cylinder.matrix3;
-        let down = axes.x_axis * (-axes.x_axis.z.signum() * foot.semi_axes.x);
-        foot.centre() + axes.z_axis * (share * foot.half_length) + down
+        let radius = axes.x_axis * (-axes.x_axis.z.signum() * foot.semi_axes.x);
+        let world = foot.centre() + axes.z_axis * (share * foot.half_length) + radius;
+        SurfacePoint { part, world, radius, z: share, taper: 0.0 }
     }
 
     /// Heel and toes of the right and the left foot.
     pub fn feet(&self) -> Feet {
-        [0, 1].map(|side| [-1.0, 1.0].map(|end| self.sole(side, end)))
-    }
-
-    /// Derivatives by the figure of the height of a point under a foot.
-    pub fn height_slopes(&self, side: usize, x: DVec3) -> [(usize, f64); 4] {
-        let joints = if side == 0 { &self.posed.right } else { &self.posed.left };
-        let left = self.ahead.perp().extend(0.0);
-        let angle = ANGLES + side * JOINTS;
-        [
-            (HEIGHT, 1.0),
-            (angle, -left.cross(x - joints.hip).z),
-            (angle + 1, left.cross(x - joints.knee).z),
-            (angle + 2, -left.cross(x - joints.ankle).z),
-        ]
+        [0, 1].map(|side| [-1.0, 1.0].map(|end| self.sole(side, end).world))
     }
 }
 
@@ -450,7 +446,7 @@ mod tests {
         let tangent = sample.normal.perp();
         let mut same: Vec<DVec2> = after
             .iter()
-            .filter(|s| s.part == sample.part && s.normal.dot(sample.normal) > 0.99)
+            .filter(|s| s.point.part == sample.point.part && s.normal.dot(sample.normal) > 0.99)
             .map(|s| s.point_px - sample.point_px)
             .filter(|p| p.length() < 4.0)
             .collect();
@@ -477,20 +473,20 @@ mod tests {
             });
             for sample in &before {
                 // Ends of parts are not lines.
-                if sample.radius == DVec3::ZERO || sample.z.abs() > 0.9 {
+                if sample.point.radius == DVec3::ZERO || sample.point.z.abs() > 0.9 {
                     continue;
                 }
                 let (Some(from), Some(to)) = (moved(sample, &low), moved(sample, &high)) else { continue };
-                now.motion(sample, &mut motion);
+                now.motion(&sample.point, &mut motion);
                 let dx: DVec3 = motion.iter().filter(|m| m.0 == coordinate).map(|m| m.1).sum();
-                let slope = gradient(&camera(), sample.world, sample.normal).dot(dx);
+                let slope = gradient(&camera(), sample.point.world, sample.normal).dot(dx);
                 let expected = (to - from) / (2.0 * step);
                 let scale = expected.abs().max(30.0);
                 assert!(
                     (slope - expected).abs() < 0.03 * scale,
                     "{coordinate} of {:?} at {:.2}: {slope:.1} for {expected:.1}",
-                    sample.part,
-                    sample.z
+                    sample.point.part,
+                    sample.point.z
                 );
                 *seen += usize::from(expected.abs() > 3.0);
             }
@@ -510,6 +506,32 @@ mod tests {
             BODY + WIDTHS + 5,
         ] {
             assert!(seen[coordinate] > 0, "{coordinate}");
+        }
+    }
+
+    /// Lengths of the legs and of the foot, angles, tilts and the pelvis move the soles, whichever of heel and toes is lower.
+    #[test]
+    fn the_lowest_point_of_the_feet_moves_with_everything_that_carries_it() {
+        let mut motion = Vec::new();
+        for turned in [-0.4, 0.6] {
+            let mut q = coordinates();
+            q[ANGLES + 2] += turned;
+            q[ANGLES + JOINTS + 2] += turned;
+            q[BODY + WIDTHS + 7] = 0.1;
+            let lowest = figure(&q).lowest_point();
+            figure(&q).motion(&lowest, &mut motion);
+            for coordinate in 0..FIGURE {
+                let at = |by: f64| {
+                    let mut q = q.clone();
+                    q[coordinate] += by;
+                    let point = figure(&q).lowest_point();
+                    assert_eq!((point.part, point.z), (lowest.part, lowest.z));
+                    point.world.z
+                };
+                let expected = (at(1e-5) - at(-1e-5)) / 2e-5;
+                let slope: f64 = motion.iter().filter(|m| m.0 == coordinate).map(|m| m.1.z).sum();
+                assert!((slope - expected).abs() < 1e-6, "{turned}: {coordinate} {slope} {expected}");
+            }
         }
     }
 

@@ -115,11 +115,11 @@ impl Tracked<'_> {
     }
 
     /// The same with the height that the picture shows if the given one is far from it: the fit near the given height
-    /// tells that it is wrong, but not by how much.
+    /// tells that it is wrong, but not by how much. One whose soles are not on the ground tells nothing else.
     fn with_height_of_its_own(&self, fit: WalkFit, problem: Problem<'_>, gait: StartGait) -> WalkFit {
         let is_given = self.height.source == HeightSource::Given && self.tilt.is_none();
         let is_off = fit.quality.verdict() != FitVerdict::Well
-            || fit.height.is_some_and(|seen| self.height.contradicts(&seen));
+            || fit.height.is_none_or(|seen| self.height.contradicts(&seen));
         let height = || problem.of_any_height().fit(gait, None).ok()?.height;
         match (is_given && is_off).then(height).flatten() {
             Some(seen) => WalkFit { height: Some(seen), ..fit },

@@ -4,14 +4,14 @@ mod outcome;
 
 use super::contrast::Contrast;
 use super::edge_search::{Border, Reach, View};
-use super::lines::{Figure, KINDS, Sample, Workspace, gradient, row_of, samples};
+use super::lines::{Figure, KINDS, Sample, SurfacePoint, Workspace, gradient, row_of, samples};
 use super::normal::{Chain, FigureTerms};
 use super::route::{Bend, figure_slopes};
 use super::seen::{LEAST_STEP, Seen};
 use super::unknowns::{
-    BEND, FRAME, FRAME_ALONG, FRAME_ANGLES, FRAME_HEIGHT, FRAME_PHASE, JOINTS, Prior, SHANK, STATURE, Slope,
-    THIGH, THIGH_OVER_SHANK, Unknowns, WHOLE, WHOLE_ACROSS, WHOLE_BEND, WHOLE_HEADING, WHOLE_LEAN, body,
-    flatten, mean_of, posture, priors, slopes, sway_m,
+    BEND, BODY, FRAME, FRAME_ALONG, FRAME_ANGLES, FRAME_HEIGHT, FRAME_PHASE, GROUND, JOINTS, Prior, SHANK,
+    STATURE, Slope, THIGH, THIGH_OVER_SHANK, Unknowns, WHOLE, WHOLE_ACROSS, WHOLE_BEND, WHOLE_GROUND,
+    WHOLE_HEADING, WHOLE_LEAN, body, excess, flatten, length, mean_of, posture, priors, slopes, sway_m,
 };
 use super::{FitError, FitOptions, LEAST_FRAMES, WalkFit, sides};
 use crate::estimate::arrow::{Arrow, FrameTerms, Solution, velocity_change};
@@ -418,8 +418,9 @@ impl<'a> Problem<'a> {
 
     /// Search width and weights of a step.
     fn width(&self, n: usize, height_px: f64) -> Width {
-        let sole = if n < FRAMES_STEP { 1.0 } else { self.sole };
-        Width { sole, ..Width::of_step(n, height_px) }
+        let is_placed = n >= FRAMES_STEP;
+        let sole = if is_placed { self.sole } else { 1.0 };
+        Width { sole, is_placed, ..Width::of_step(n, height_px) }
     }
 
     /// The figure of a frame.
@@ -527,7 +528,7 @@ impl<'a> Problem<'a> {
         let Workspace { samples, motion, profile, .. } = work;
         for sample in samples.iter() {
             let border = match sample.is_outer {
-                true => Border::Outer { body_level: self.body_levels[row_of(sample.part)] },
+                true => Border::Outer { body_level: self.body_levels[row_of(sample.point.part)] },
                 false => Border::Inner,
             };
             let Some(edge) = view.search(sample.point_px, sample.normal, &width.reach, border, profile)
@@ -543,8 +544,8 @@ impl<'a> Problem<'a> {
             let clear = edge.strength / (edge.strength + CLEAR_STEP);
             let trust = if is_sole(sample) { width.sole } else { 1.0 };
             let weight = importance * trust * near * clear / width.sd_px().powi(2);
-            figure.motion(sample, motion);
-            let n_j = gradient(self.camera, sample.world, sample.normal);
+            figure.motion(&sample.point, motion);
+            let n_j = gradient(self.camera, sample.point.world, sample.normal);
             terms.add(motion.iter().map(|(q, dx)| (*q, n_j.dot(*dx))), edge.offset_px, weight);
         }
         // The head ends where the changes do, but for what hair and the windows of the change detection make of it.
@@ -553,49 +554,66 @@ impl<'a> Problem<'a> {
             let beyond_px = off_px - off_px.clamp(-free_px, free_px);
             let weight = if beyond_px == 0.0 { 0.0 } else { (CROWN_SD * width.height_px).powi(-2) };
             figure.motion(&crown, motion);
-            let n_j = gradient(self.camera, crown.world, crown.normal);
+            let n_j = gradient(self.camera, crown.world, DVec2::NEG_Y);
             terms.add(motion.iter().map(|(q, dx)| (*q, n_j.dot(*dx))), beyond_px, weight);
         }
-        // The lower foot stands on the ground, with an error common to about ten independent frames.
-        let (side, lowest) = figure.lowest_point();
+        // The lower foot stands on the ground, whose height is an unknown, with an error common to about ten independent frames.
+        let lowest = figure.lowest_point();
         let weight = self.ground_sd_m.powi(-2) / (self.frames.len() as f64 / GROUND_FRAMES).max(1.0);
-        terms.add(figure.height_slopes(side, lowest).into_iter(), -lowest.z, weight);
+        figure.motion(&lowest, motion);
+        motion.retain(|&(q, _)| width.is_placed || q < BODY);
+        motion.push((GROUND, DVec3::NEG_Z));
+        let above_m = lowest.world.z - unknowns.whole[WHOLE_GROUND];
+        terms.add(motion.iter().map(|(q, dx)| (*q, dx.z)), -above_m, weight);
         let (normal, right) = terms.sums();
         (figure, normal, right, seen)
     }
 
     /// The top of the head, and how far the crown of the changes is above it, pixels.
-    fn crown(&self, figure: &Figure, crown_px: f64) -> Option<(Sample, f64)> {
+    fn crown(&self, figure: &Figure, crown_px: f64) -> Option<(SurfacePoint, f64)> {
         let head = &figure.posed.cylinders[Part::Head as usize];
         let world = head.centre() + head.world_from_cylinder.matrix3.z_axis * head.half_length;
         let point_px = self.camera.project(world)?;
-        let sample = Sample {
-            part: Part::Head,
-            point_px,
-            normal: DVec2::NEG_Y,
-            is_outer: true,
-            world,
-            radius: DVec3::ZERO,
-            z: 1.0,
-            taper: 0.0,
-        };
-        Some((sample, point_px.y - crown_px))
+        let point = SurfacePoint { part: Part::Head, world, radius: DVec3::ZERO, z: 1.0, taper: 0.0 };
+        Some((point, point_px.y - crown_px))
+    }
+
+    /// A length of the mean person, as a share of the height, and zero of what is no length.
+    fn share(&self, unknown: usize) -> f64 {
+        let length = length(&self.walker.body.proportions, unknown);
+        length.map_or(0.0, |average| average + self.priors[unknown].mean)
+    }
+
+    /// An unknown of somebody of the walker's height with the same proportions: of a person who is taller by e, the priors are of
+    /// x - (average + mean) e.
+    fn of_its_size(&self, whole: &[f64], unknown: usize) -> f64 {
+        whole[unknown] - self.share(unknown) * excess(whole)
+    }
+
+    /// The slopes of a sum of such unknowns.
+    fn size_terms(&self, sum: &[(usize, f64)]) -> Vec<(usize, f64)> {
+        let share: f64 = sum.iter().map(|&(n, factor)| factor * self.share(n)).sum();
+        let grown = STATURE.iter().map(|&part| (part, -share)).filter(|_| share != 0.0);
+        sum.iter().copied().chain(grown).collect()
     }
 
     /// Priors of people, of the stated height and of smooth motion.
     fn add_priors(&self, unknowns: &Unknowns, block: usize, arrow: &mut Arrow) {
         for (n, prior) in self.priors.iter().enumerate() {
-            arrow.add_whole_row(&[(n, 1.0)], prior.mean - unknowns.whole[n], prior.sd.powi(-2));
+            let off = self.of_its_size(&unknowns.whole, n);
+            arrow.add_whole_row(&self.size_terms(&[(n, 1.0)]), prior.mean - off, prior.sd.powi(-2));
         }
+        let [thigh, shank] = [THIGH, SHANK].map(|n| self.of_its_size(&unknowns.whole, n));
+        let Prior { mean, sd } = THIGH_OVER_SHANK;
+        let terms = self.size_terms(&[(THIGH, 1.0), (SHANK, -1.0)]);
+        let off = mean - (thigh - shank);
+        arrow.add_whole_row(&terms, off, student(off / sd) * sd.powi(-2));
         for (row, precision) in self.bend.iter().flat_map(Bend::priors) {
             let terms: [(usize, f64); BEND] = std::array::from_fn(|j| (WHOLE_BEND + j, row[j]));
             let now: f64 = terms.iter().map(|&(n, factor)| factor * unknowns.whole[n]).sum();
             arrow.add_whole_row(&terms, -now, precision);
         }
-        let apart = unknowns.whole[THIGH] - unknowns.whole[SHANK];
-        let Prior { mean, sd } = THIGH_OVER_SHANK;
-        arrow.add_whole_row(&[(THIGH, 1.0), (SHANK, -1.0)], mean - apart, sd.powi(-2));
-        let excess: f64 = STATURE.iter().map(|&n| unknowns.whole[n]).sum();
+        let excess = excess(&unknowns.whole);
         // An unknown height is held until the curves are found: long legs look like bent ones at first.
         let Prior { mean, sd } =
             if block == FRAME { self.excess } else { Prior { mean: 0.0, sd: self.options.height_sd } };
@@ -632,6 +650,9 @@ pub(super) struct Width {
     height_px: f64,
     /// What the edge of a sole counts in the step, of what it counts in the cost.
     sole: f64,
+    /// False while the person is still moved to the ground, which then says nothing of the lengths of the legs: those of a person
+    /// who starts too low would become short, and the feet be sought in the shanks.
+    is_placed: bool,
 }
 
 impl Width {
@@ -639,7 +660,7 @@ impl Width {
         let done = n as f64 / (STEPS.iter().sum::<usize>() - 1) as f64;
         let at = |[first, last]: [f64; 2]| height_px * (first + (last - first) * done);
         let reach = Reach::new(at(REACH).max(LEAST_REACH_PX), BEYOND * height_px);
-        Self { reach, scale_px: at(SCALE).max(1.0), height_px, sole: 1.0 }
+        Self { reach, scale_px: at(SCALE).max(1.0), height_px, sole: 1.0, is_placed: true }
     }
 
     fn spacing_px(&self) -> f64 {
@@ -671,13 +692,13 @@ pub(super) struct Fitted {
 /// An outline counts fully, a foot half, because shoes have edges of their own, and so do clothes inside the body.
 /// The top of the thigh belongs to buttock and pelvis as much.
 fn importance(sample: &Sample) -> f64 {
-    let row = row_of(sample.part);
+    let row = row_of(sample.point.part);
     let of_border = match (sample.is_outer, row) {
         (true, 7) => 0.5,
         (true, _) => 1.0,
         (false, _) => 0.25,
     };
-    let is_top_of_thigh = row == 5 && sample.z > 1.0 - 2.0 * 0.28;
+    let is_top_of_thigh = row == 5 && sample.point.z > 1.0 - 2.0 * 0.28;
     let of_limb = if (2..=4).contains(&row) { 0.3 } else { 1.0 };
     of_limb * if is_top_of_thigh { 0.3 * of_border } else { of_border }
 }
@@ -693,7 +714,7 @@ const SOLE: f64 = 0.1;
 
 /// True at the lower border of a foot.
 fn is_sole(sample: &Sample) -> bool {
-    sample.is_outer && row_of(sample.part) == 7 && sample.normal.y > 0.0
+    sample.is_outer && row_of(sample.point.part) == 7 && sample.normal.y > 0.0
 }
 
 /// The cost of an edge at a distance x, x² / (1 + x²), and the weight with which least squares lower it,
@@ -701,6 +722,13 @@ fn is_sole(sample: &Sample) -> bool {
 fn robust(distance: f64) -> [f64; 2] {
     let near = 1.0 / (1.0 + distance * distance);
     [1.0 - near, near * near]
+}
+
+/// The weight with which least squares lower the negative logarithm of Student's t of four degrees of freedom, of a distance in
+/// standard deviations. With it, people may be far from the mean whose skeletons nobody has measured.
+fn student(distance: f64) -> f64 {
+    const FREEDOM: f64 = 4.0;
+    (FREEDOM + 1.0) / (FREEDOM + distance * distance)
 }
 
 /// The changes may end so far from the crown, and the standard deviation of what is beyond, shares of the person's height.

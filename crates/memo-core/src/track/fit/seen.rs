@@ -41,7 +41,7 @@ impl Seen {
             self.outer += 1.0;
             self.outer_missed += missed;
             self.distance_px += (1.0 - missed) * edge.offset_px.abs();
-            let part = &mut self.parts[sample.part as usize];
+            let part = &mut self.parts[sample.point.part as usize];
             part.samples += 1.0;
             part.missed += missed;
             part.distance_px += (1.0 - missed) * edge.offset_px.abs();

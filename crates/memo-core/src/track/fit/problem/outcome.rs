@@ -8,7 +8,7 @@ use super::super::belt::{self, Belt};
 use super::super::contacts::{self, Feet};
 use super::super::unknowns::{
     self, ANGLES, FRAME, FRAME_ALONG, FRAME_HEIGHT, FRAME_PHASE, JOINTS, Prior, STATURE, TORSO, Unknowns,
-    WHOLE, WHOLE_ACROSS, WHOLE_BEND, WHOLE_HEADING, WHOLE_LEAN, body, posture, slopes,
+    WHOLE, WHOLE_ACROSS, WHOLE_BEND, WHOLE_HEADING, WHOLE_LEAN, body, excess, posture, slopes,
 };
 use super::super::{FitQuality, FittedFrame, Measured, PartQuality, WalkFit};
 use super::{Fitted, Problem};
@@ -30,7 +30,7 @@ impl Problem<'_> {
         let seen = &fitted.seen;
         let lengths = STATURE.iter().map(|&n| {
             let Prior { mean, sd } = self.priors[n];
-            ((fitted.unknowns.whole[n] - mean) / sd).abs()
+            ((self.of_its_size(&fitted.unknowns.whole, n) - mean) / sd).abs()
         });
         FitQuality {
             residual_px: seen.distance_px / (seen.outer - seen.outer_missed).max(1.0),
@@ -64,7 +64,8 @@ impl Problem<'_> {
 
     /// Mean height of the lower sole above the ground.
     fn mean_sole_m(&self, unknowns: &Unknowns) -> f64 {
-        let soles: f64 = (0..self.frames.len()).map(|k| self.figure(unknowns, k).lowest_point().1.z).sum();
+        let soles: f64 =
+            (0..self.frames.len()).map(|k| self.figure(unknowns, k).lowest_point().world.z).sum();
         soles / self.frames.len() as f64
     }
 
@@ -134,7 +135,7 @@ impl Problem<'_> {
     /// The body height without the prior of the excess, which is taken out as it was put in: with estimate x and
     /// variance v after all evidence, and prior m, s², the others say x' = v' (x / v - m / s²), 1 / v' = 1 / v - 1 / s².
     fn height(&self, fitted: &Fitted, covariance: &Covariance, quality: &FitQuality) -> Option<BodyHeight> {
-        let excess: f64 = STATURE.iter().map(|&n| fitted.unknowns.whole[n]).sum();
+        let excess = excess(&fitted.unknowns.whole);
         let variance = covariance.variance(&STATURE.map(|n| (n, 1.0)), &[]);
         let Prior { mean, sd } = self.excess;
         let weight = variance.recip() - sd.powi(-2);

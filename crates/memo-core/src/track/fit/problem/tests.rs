@@ -1,6 +1,7 @@
-use super::super::unknowns::{ALONG, HEIGHT};
+use super::super::unknowns::{ALONG, CROWN, HEIGHT};
 use super::*;
 use crate::image::Image;
+use crate::model::Body;
 use crate::synth::scene::{SceneOptions, SynthScene, Truth};
 use crate::track::search::tests::{camera, walker};
 
@@ -165,7 +166,7 @@ fn the_crown_of_the_changes_draws_the_head_to_it() {
             let width = problem.last_start_width(&unknowns).unwrap();
             let (figure, _, right, _) = problem.figure_terms(&unknowns, 10, &width, &mut Room::default());
             let (top, _) = problem.crown(&figure, crown_px).unwrap();
-            (right[HEIGHT], top.point_px.y, width.height_px)
+            (right[HEIGHT], camera.project(top.world).unwrap().y, width.height_px)
         };
         frames[10].view.crown_px = None;
         let (_, row, height_px) = at(&frames, 0.0);
@@ -232,33 +233,33 @@ fn thigh_and_shank_differ_less_than_legs() {
     let Drawn { camera, walker, route, frames } = drawn();
     let options = FitOptions::default();
     let problem = Problem::new(&camera, &walker, &route, &frames, &options);
-    let start = problem.start(0.0);
-    let mut arrow = Arrow::new(frames.len(), FRAME, WHOLE);
-    problem.add_priors(&start, FRAME, &mut arrow);
-    for frame in 0..frames.len() {
-        (0..FRAME_ANGLES).for_each(|unknown| arrow.add_row(&[(arrow.index(frame, unknown), 1.0)], 0.0, 1.0));
-    }
-    let covariance = arrow.solve().unwrap().covariance();
-    let sd = |shank: f64| covariance.variance(&[(THIGH, 1.0), (SHANK, shank)], &[]).sqrt();
     let [thigh, of_shank] = [THIGH, SHANK].map(|at| problem.priors[at].sd);
-    let expected = (thigh.hypot(of_shank).powi(-2) + THIGH_OVER_SHANK.sd.powi(-2)).recip().sqrt();
-    assert!((sd(-1.0) - expected).abs() < 1e-9, "{} {expected}", sd(-1.0));
+    let terms = problem.size_terms(&[(THIGH, 1.0), (SHANK, -1.0)]);
+    // Student's t of four degrees of freedom holds those of unusual legs less.
+    for (off_sd, weight) in [(0.0, 5.0 / 4.0), (2.0, 5.0 / 8.0), (6.0, 5.0 / 40.0)] {
+        let mut start = problem.start(0.0);
+        start.whole[CROWN] -= excess(&start.whole);
+        start.whole[THIGH] += 0.5 * off_sd * THIGH_OVER_SHANK.sd;
+        start.whole[SHANK] -= 0.5 * off_sd * THIGH_OVER_SHANK.sd;
+        let mut arrow = Arrow::new(frames.len(), FRAME, WHOLE);
+        problem.add_priors(&start, FRAME, &mut arrow);
+        for frame in 0..frames.len() {
+            (0..FRAME_ANGLES)
+                .for_each(|unknown| arrow.add_row(&[(arrow.index(frame, unknown), 1.0)], 0.0, 1.0));
+        }
+        let sd = arrow.solve().unwrap().covariance().variance(&terms, &[]).sqrt();
+        let of_legs = weight * THIGH_OVER_SHANK.sd.powi(-2);
+        let expected = (thigh.hypot(of_shank).powi(-2) + of_legs).recip().sqrt();
+        assert!((sd - expected).abs() < 1e-9, "{off_sd}: {sd} {expected}");
+    }
     // The mean is that of the average walker.
     assert!((problem.priors[THIGH].mean - problem.priors[SHANK].mean - THIGH_OVER_SHANK.mean).abs() < 1e-12);
 }
 
 /// A sample of the upright side of a part.
 fn sample(part: Part, is_outer: bool) -> Sample {
-    Sample {
-        part,
-        point_px: DVec2::ZERO,
-        normal: DVec2::X,
-        is_outer,
-        world: DVec3::ZERO,
-        radius: DVec3::Y,
-        z: 0.0,
-        taper: 0.0,
-    }
+    let point = SurfacePoint { part, world: DVec3::ZERO, radius: DVec3::Y, z: 0.0, taper: 0.0 };
+    Sample { point, point_px: DVec2::ZERO, normal: DVec2::X, is_outer }
 }
 
 #[test]
@@ -269,7 +270,8 @@ fn contours_inside_the_body_and_of_shoes_count_less_than_the_outline() {
     assert_eq!(of(Part::Torso, false), 0.25);
     assert_eq!(of(Part::LeftFoot, true), 0.5);
     assert_eq!(of(Part::LeftForearm, true), 0.3);
-    let top = Sample { z: 0.9, ..sample(Part::LeftThigh, true) };
+    let mut top = sample(Part::LeftThigh, true);
+    top.point.z = 0.9;
     assert_eq!([importance(&top), of(Part::LeftThigh, true)], [0.3, 1.0]);
 }
 
@@ -324,7 +326,7 @@ fn the_sides_of_who_is_hidden_in_part_are_less_certain() {
         arrow.add_row(&[(0, 1.0)], 0.0, 1.0);
         arrow.add_whole_row(&[(0, 1.0)], 0.0, 1.0);
         Fitted {
-            unknowns: Unknowns { whole: Vec::new(), frames: Vec::new() },
+            unknowns: Unknowns { whole: vec![0.0; WHOLE], frames: Vec::new() },
             seen: Seen { cost, inner: 100.0, outer: 500.0, ..Seen::default() },
             solution: arrow.solve().unwrap(),
             height_px: 300.0,
@@ -357,4 +359,71 @@ fn a_heading_that_is_held_is_that_of_the_route() {
     assert!(off_rad[0] < -0.05, "{off_rad:?}");
     assert!(off_rad[1].abs() < 1e-4, "{off_rad:?}");
     assert!(held.quality(&fitted).cost > problem.quality(&free).cost, "it fits less well");
+}
+
+/// The picture shows how tall somebody is, whatever height the fit starts from.
+#[test]
+fn the_measured_height_does_not_depend_on_the_given_one() {
+    let seen_m = |share: f64| {
+        let Drawn { camera, mut walker, route, frames } = drawn_for(TWO_STEPS);
+        let true_m = walker.body.height_m;
+        walker.body.height_m *= share;
+        let options = FitOptions::default();
+        let problem = Problem::new(&camera, &walker, &route, &frames, &options).of_any_height();
+        let fit = problem.fit(StartGait::Average, None).unwrap();
+        (fit.height.unwrap().height_m, true_m)
+    };
+    let (from_the_true, true_m) = seen_m(1.0);
+    assert!((from_the_true / true_m - 1.0).abs() < 0.03, "{from_the_true} of {true_m}");
+    for share in [0.9, 0.95, 1.05] {
+        let (height_m, _) = seen_m(share);
+        assert!((height_m / from_the_true - 1.0).abs() < 0.005, "{share}: {height_m} for {from_the_true}");
+    }
+}
+
+/// Lengths of somebody of another height are those of the mean person, enlarged.
+#[test]
+fn the_limbs_of_a_taller_person_are_longer() {
+    let Drawn { camera, walker, route, frames } = drawn();
+    let options = FitOptions::default();
+    let mut problem = Problem::new(&camera, &walker, &route, &frames, &options);
+    problem.excess = Prior { mean: 0.1, sd: 1e-6 };
+    let start = problem.start(0.0);
+    let mut arrow = Arrow::new(frames.len(), FRAME, WHOLE);
+    problem.add_priors(&start, FRAME, &mut arrow);
+    for frame in 0..frames.len() {
+        (0..FRAME_ANGLES).for_each(|unknown| arrow.add_row(&[(arrow.index(frame, unknown), 1.0)], 0.0, 1.0));
+    }
+    let solution = arrow.solve().unwrap();
+    let body = body(&walker.body, (&solution.whole + DVector::from_vec(start.whole.clone())).as_slice());
+    let mean = super::super::unknowns::body(&walker.body, &start.whole);
+    let lengths = |body: &Body| {
+        let p = body.proportions;
+        [
+            p.hip_height - p.knee_height,
+            p.knee_height - p.ankle_height,
+            p.upper_arm,
+            p.foot,
+            p.shoulder_half_width,
+        ]
+    };
+    for (n, (taller, mean)) in lengths(&body).into_iter().zip(lengths(&mean)).enumerate() {
+        assert!((taller / mean - 1.1).abs() < 0.005, "{n}: {taller} {mean}");
+    }
+}
+
+/// Of a person whose height is known, the ground is found where the picture has it and not where the model of the camera does.
+#[test]
+fn the_ground_may_be_elsewhere_than_in_the_model_of_the_camera() {
+    let Drawn { camera, walker, route, frames } = drawn_for(TWO_STEPS);
+    let options = FitOptions { height_sd: 1e-3, ..FitOptions::default() };
+    let ground_m = |raised_m: f64| {
+        let translation = camera.translation - camera.rotation * (raised_m * DVec3::Z);
+        let camera = Camera { translation, ..camera.clone() };
+        let problem = Problem::new(&camera, &walker, &route, &frames, &options);
+        let (start, _) = problem.best_start(0.0).unwrap();
+        problem.finished(start).unwrap().unknowns.whole[WHOLE_GROUND]
+    };
+    let rises_m = ground_m(0.02) - ground_m(0.0);
+    assert!((0.01..0.02).contains(&rises_m), "{rises_m}");
 }
