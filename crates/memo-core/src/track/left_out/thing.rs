@@ -111,16 +111,16 @@ impl Shots {
 pub struct WalkBoxes {
     pub shots: Shots,
     /// The first frame in which somebody else can be told from the person: until the walk is started, after its first
-    /// frames, its regions are those of a candidate.
+    /// frames, its regions are those of a candidate, and until its path is settled, they are what the average walker leaves.
     told_apart: usize,
 }
 
 impl WalkBoxes {
-    /// From the frames in order, of a walk that was started in a frame, if it was; `None` without any.
-    pub fn new(mut shots: impl Iterator<Item = Shot>, started: Option<usize>) -> Option<Self> {
+    /// From the frames in order, of a walk whose person is known after a frame, if at all; `None` without any.
+    pub fn new(mut shots: impl Iterator<Item = Shot>, known: Option<usize>) -> Option<Self> {
         let mut walk_boxes = Shots::new(shots.next()?, MOST_STEPS);
         shots.for_each(|shot| walk_boxes.push(shot));
-        let told_apart = started.map_or(usize::MAX, |frame| frame + 1);
+        let told_apart = known.map_or(usize::MAX, |frame| frame + 1);
         Some(Self { shots: walk_boxes, told_apart })
     }
 

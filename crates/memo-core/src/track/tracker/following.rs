@@ -163,6 +163,8 @@ impl Tracker {
             self.people.insert(k, active);
         }
         self.people[k].settle(&self.backdrop, &self.options);
+        let followed = self.people[k].steps().last().map(|step| step.frame);
+        self.people[k].known_frame = self.people[k].known_frame.and(followed);
         let standing = std::mem::take(&mut self.standing);
         let active = &mut self.people[k];
         active.earlier = standing.before(active.kept.first().map_or(0, |(_, edges)| edges.frame));

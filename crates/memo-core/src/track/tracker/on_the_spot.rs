@@ -58,7 +58,7 @@ impl Tracker {
                     Some(joined) => active = joined,
                     None => active.person = self.identified(&active),
                 }
-                active.started_frame.get_or_insert(evidence.frame);
+                active.known_frame.get_or_insert(evidence.frame);
                 self.people.push(active);
             }
             Err(standing) if standing.lasts_s() < LONGEST_S => self.standing = standing,
@@ -157,7 +157,7 @@ impl Tracker {
             None => Err(standing),
         };
         match begun.or_else(|standing| self.begun_along_the_sight(standing, size, person)) {
-            Ok(begun) => Active { person, started_frame: active.started_frame, ..begun },
+            Ok(begun) => Active { person, known_frame: active.known_frame, ..begun },
             Err(_) => active,
         }
     }

@@ -39,7 +39,7 @@ impl Tracker {
                         active.before.clear();
                         self.order_of_heights = order;
                     }
-                    active.started_frame = Some(evidence.frame);
+                    active.known_frame = Some(evidence.frame);
                     self.people.push(active);
                 }
                 Err(reason) => {

@@ -349,10 +349,13 @@ fn frames_are_kept_until_there_are_enough_for_the_path() {
     let mut tracker = following(20, -0.5, 1.2);
     tracker.options.path_frames = 3;
     tracker.people.first_mut().unwrap().settled = false;
+    tracker.people.first_mut().unwrap().known_frame = Some(12);
     for (k, (kept, turned)) in [(1, false), (2, false), (3, true), (4, true)].into_iter().enumerate() {
         tracker.advance(&evidence(20 + k, &[])).unwrap();
         let active = tracker.people.first().unwrap();
         assert_eq!((active.kept.len(), active.settled), (kept, turned), "frame {k}");
+        // From there on the person is followed, of whom the average left parts unexplained.
+        assert_eq!(active.known_frame, Some(if turned { 22 } else { 12 }), "frame {k}");
     }
 }
 
@@ -840,9 +843,9 @@ fn a_walk_whose_feet_go_along_the_line_of_sight_begins_again_there() {
         // The first frames are those from before the walk.
         let (kept, feet) = (seen.kept[20..].to_vec(), seen.feet.clone());
         tracker.standing = seen.before(20);
-        let walk = Active { kept, feet, person: 3, started_frame: Some(12), ..active(steps) };
+        let walk = Active { kept, feet, person: 3, known_frame: Some(12), ..active(steps) };
         let begun = tracker.begun_otherwise(walk);
-        assert_eq!((begun.person, begun.started_frame), (3, Some(12)));
+        assert_eq!((begun.person, begun.known_frame), (3, Some(12)));
         assert_eq!(begun.is_frontal(), is_along);
         if is_along {
             assert_eq!(begun.kept.len(), 66);

@@ -43,7 +43,7 @@ pub(super) fn walk_boxes(active: &Active) -> Option<WalkBoxes> {
         let rectangle = body_rectangle(&active.camera, &body)?;
         Some(Shot { frame: step.frame, time_s: step.time_s, rectangle })
     };
-    WalkBoxes::new(active.steps().iter().filter_map(shot), active.started_frame)
+    WalkBoxes::new(active.steps().iter().filter_map(shot), active.known_frame)
 }
 
 /// The rectangle of a body in the image; `None` if it is outside.

@@ -91,6 +91,11 @@ const TWO_STEPS: usize = 44;
 /// The frames of somebody with the mean joint curves of people, but for a knee, of the side 0 or 1, whose flexion is smaller
 /// by a share.
 fn with_a_stiff_knee(side: usize, share: f64) -> Drawn {
+    drawn_otherwise(|gait, whole| flatten(gait, whole, 1, side, share))
+}
+
+/// The frames of somebody with the mean joint curves of people, but for some unknowns of the whole.
+fn drawn_otherwise(change: impl Fn(&Gait, &mut [f64])) -> Drawn {
     let mut drawn = drawn_for(TWO_STEPS);
     let scene = SynthScene::new(scene(TWO_STEPS)).unwrap();
     let background = scene.frame(0);
@@ -98,7 +103,7 @@ fn with_a_stiff_knee(side: usize, share: f64) -> Drawn {
     let pictures: Vec<Image<u8>> = {
         let problem = Problem::new(&drawn.camera, &drawn.walker, &drawn.route, &drawn.frames, &options);
         let mut unknowns = problem.start(0.0);
-        flatten(&drawn.walker.gait, &mut unknowns.whole, 1, side, share);
+        change(&drawn.walker.gait, &mut unknowns.whole);
         let shown = (0..scene.len()).filter(|&k| scene.truth(k).is_some()).enumerate();
         shown.map(|(n, k)| scene.frame_of(k, Some(&problem.figure(&unknowns, n).posed))).collect()
     };
@@ -343,6 +348,22 @@ fn the_sides_of_who_is_hidden_in_part_are_less_certain() {
 }
 
 /// From a start that faces 0.15 radians to the side, a fit turns back; the same with its heading held does not.
+/// Of a wholly visible person, the first steps reach the trunk from the mean.
+#[test]
+fn the_trunk_of_who_is_hidden_in_part_may_lean_more_than_others() {
+    for (lean_rad, is_forward) in [(-0.2, false), (0.26, true)] {
+        let mut drawn = drawn_otherwise(|_, whole| whole[WHOLE_LEAN] = lean_rad);
+        let options = FitOptions::default();
+        let gait = |frames: &[FitFrame]| {
+            let problem = Problem::new(&drawn.camera, &drawn.walker, &drawn.route, frames, &options);
+            problem.start_gait(0.0).unwrap()
+        };
+        assert_eq!(gait(&drawn.frames), StartGait::Average);
+        drawn.frames.iter_mut().for_each(|frame| frame.visible = 0.7);
+        assert_eq!(gait(&drawn.frames), StartGait::Leaning { is_forward });
+    }
+}
+
 #[test]
 fn a_heading_that_is_held_is_that_of_the_route() {
     let Drawn { camera, walker, route, frames } = drawn();
