@@ -3,6 +3,7 @@
 use super::candidate::Seen;
 use super::crowd::{Expected, body_box, expected};
 use super::decisions::STRIDE_HEIGHTS;
+use super::fit::edge_search::View;
 use super::fit::of_walk::Tracked;
 use super::fit::views::{Backdrop, Piece};
 use super::fit::{FitError, WalkFit};
@@ -236,19 +237,24 @@ impl Active {
         if self.is_frontal() {
             return Some(Err(FitError::Frontal));
         }
-        let steps = self.steps();
-        let shown: HashSet<usize> =
-            steps.iter().filter(|step| !step.by_feet).map(|step| step.frame).collect();
-        let pieces = self.pieces.iter().filter(|piece| shown.contains(&piece.frame));
-        let views = match self.is_on_treadmill {
-            true => self.early.as_ref().unwrap_or(backdrop).views_on_the_spot(pieces),
-            false => backdrop.views(pieces),
-        };
+        let views = self.views(backdrop).into_iter().map(|(_, view)| view).collect();
         let on_scale = |fit: WalkFit| {
             let height = fit.height.map(|height| height.on_scale(self.height.scale_sd));
             WalkFit { height, ..fit }
         };
         Some(self.tracked(options).fit(views, fit, p_swapped).map(on_scale))
+    }
+
+    /// What the frames show in which contours show the walk.
+    pub(super) fn views(&self, backdrop: &Backdrop) -> Vec<(usize, View)> {
+        let shown: HashSet<usize> =
+            self.steps().iter().filter(|step| !step.by_feet).map(|step| step.frame).collect();
+        let pieces = || self.pieces.iter().filter(|piece| shown.contains(&piece.frame));
+        let views = match self.is_on_treadmill {
+            true => self.early.as_ref().unwrap_or(backdrop).views_on_the_spot(pieces()),
+            false => backdrop.views(pieces()),
+        };
+        pieces().map(|piece| piece.frame).zip(views).collect()
     }
 
     /// Row of the crown in each frame by the changes, pixels.
@@ -296,7 +302,6 @@ impl Active {
 
 #[cfg(test)]
 pub(super) mod tests {
-    use super::super::fit::edge_search::View;
     use super::super::route::Route;
     use super::super::search::tests::{camera, edges_of, rectangle_of, walker};
     use super::super::search::{Hypothesis, Path, Scene};

@@ -8,6 +8,7 @@ mod candidate;
 mod crowd;
 pub mod cycles;
 mod decisions;
+mod double;
 mod ending;
 pub(crate) mod event;
 pub mod evidence;

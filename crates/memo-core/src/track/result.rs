@@ -5,11 +5,10 @@
 //! observed distance of measurements from predictions. Two errors that do not average out over frames are added:
 //! the difference between the person's body and the model, and the distance.
 
-use super::crowd::body_box;
-use super::decisions::{ACROSS_SD_M, COMMON_PHASE_SD, SAME_BODY, SAME_BODY_OF_POOR, WITHIN_BODY};
+use super::decisions::{ACROSS_SD_M, COMMON_PHASE_SD};
 use super::event::EventKind;
 use super::fit::contacts::Contact;
-use super::fit::{FitError, FitVerdict, FittedFrame, Measured, WalkFit};
+use super::fit::{FitError, FittedFrame, Measured, WalkFit};
 use super::height::{BodyHeight, HeightSource};
 use super::route::Route;
 use super::search::{Hypothesis, Scene};
@@ -17,11 +16,9 @@ use super::start::{Direction, StartReport};
 use super::walk::{Step, Walk, WalkOptions};
 use crate::calibrate::TiltEstimate;
 use crate::estimate::kalman::{ConstantVelocity, FilterOptions, Noise, smooth};
-use crate::image::Sides;
 use crate::model::{Camera, PosedBody, Posture, SideJoints, Walker};
 use glam::{DVec2, DVec3};
 use std::borrow::Cow;
-use std::collections::BTreeMap;
 
 use crate::model::skeleton::Side;
 
@@ -181,51 +178,6 @@ impl TrackedWalk {
     /// Steps of the better twin: measurements and filtered states.
     pub fn steps(&self) -> &[Step] {
         self.walk.steps()
-    }
-
-    /// True if the walk is a second model of the person of another walk, and this is the one to withdraw: their bodies lie
-    /// on each other in the image, on average over at least half of the shorter one's frames. The longer one stays, unless
-    /// it alone fits poorly and half of its frames are common to both.
-    pub(super) fn is_double_of(&self, other: &Self) -> bool {
-        let frame = |step: Option<&Step>| step.map_or(0, |step| step.frame);
-        let [(a, b), (c, d)] =
-            [self, other].map(|walk| (frame(walk.steps().first()), frame(walk.steps().last())));
-        if a > d || c > b {
-            return false;
-        }
-        let [own, others] = [self, other].map(Self::boxes);
-        let common: Vec<[&Sides; 2]> =
-            own.iter().filter_map(|(frame, sides)| Some([sides, others.get(frame)?])).collect();
-        let mean = |overlap: fn(&Sides, &Sides) -> f64| {
-            common.iter().map(|[a, b]| overlap(a, b)).sum::<f64>() / common.len().max(1) as f64
-        };
-        let is_off = [self.fits_poorly(), other.fits_poorly()];
-        let is_same = if is_off[0] == is_off[1] {
-            mean(Sides::overlap) > SAME_BODY
-        } else {
-            mean(Sides::overlap) > SAME_BODY_OF_POOR || mean(Sides::overlap_of_smaller) > WITHIN_BODY
-        };
-        let is_common = |frames: usize| 2 * common.len() >= frames;
-        if !is_same || !is_common(own.len().min(others.len())) {
-            return false;
-        }
-        match is_off {
-            [true, false] if is_common(own.len()) => true,
-            [false, true] if is_common(others.len()) => false,
-            _ => own.len() <= others.len(),
-        }
-    }
-
-    fn fits_poorly(&self) -> bool {
-        self.fitted().is_some_and(|fit| fit.quality.verdict() == FitVerdict::Poorly)
-    }
-
-    /// The box of the body in the image in each frame.
-    fn boxes(&self) -> BTreeMap<usize, Sides> {
-        let of_row = |(k, row): (usize, &Row)| {
-            Some((row.frame, body_box(&self.camera, &self.pose_of(k, row).cylinders)?))
-        };
-        self.rows().iter().enumerate().filter_map(of_row).collect()
     }
 
     /// One row per frame.

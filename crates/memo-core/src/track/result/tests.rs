@@ -5,7 +5,6 @@ use super::super::walk::tests::step_in;
 use super::super::walk::{Beginning, Look, State};
 use super::*;
 use crate::estimate::kalman::FilterOptions;
-use crate::model::Body;
 use crate::synth::Random;
 use crate::track::fit::FitQuality;
 use glam::DVec2;
@@ -307,7 +306,7 @@ fn an_assumed_height_widens_places_in_proportion_to_their_distance() {
 }
 
 /// A walk that begins so far ahead of others, after so many frames.
-fn beside(ahead_m: f64, first: usize, count: usize) -> TrackedWalk {
+pub fn beside(ahead_m: f64, first: usize, count: usize) -> TrackedWalk {
     let at =
         |k: usize| Hypothesis { along_m: ahead_m + 0.048 * k as f64, height_m: 1.2, phase: 0.036 * k as f64 };
     let frames: Vec<_> = (first..first + count).map(|k| (0.04 * k as f64, Some(at(k)))).collect();
@@ -317,7 +316,7 @@ fn beside(ahead_m: f64, first: usize, count: usize) -> TrackedWalk {
 }
 
 /// The same with a fit, of which this share of the outline found no edge.
-fn fitted(walk: TrackedWalk, missed: f64) -> TrackedWalk {
+pub fn fitted(walk: TrackedWalk, missed: f64) -> TrackedWalk {
     let frame = |row: &Row| FittedFrame {
         torso_centre: row.torso_centre,
         heading_rad: row.heading_rad,
@@ -350,41 +349,6 @@ fn fitted(walk: TrackedWalk, missed: f64) -> TrackedWalk {
         },
     };
     TrackedWalk { fit: Some(Ok(fit)), ..walk }
-}
-
-#[test]
-fn of_two_walks_whose_bodies_lie_on_each_other_the_shorter_one_is_a_double() {
-    let (long, short) = (beside(-0.5, 0, 30), beside(-0.45, 4, 12));
-    assert!(short.is_double_of(&long) && !long.is_double_of(&short));
-    assert!(!beside(0.0, 4, 12).is_double_of(&long), "half a metre ahead");
-    assert!(!beside(-0.45, 100, 12).is_double_of(&long), "later");
-    assert!(!beside(-0.45, 24, 16).is_double_of(&long), "common to both are six frames");
-}
-
-/// The same with a body that is smaller by a fifth, about the same middle.
-fn smaller(mut walk: TrackedWalk) -> TrackedWalk {
-    let fit = walk.fit.as_mut().unwrap().as_mut().unwrap();
-    fit.body = Body::from_height(0.8 * fit.body.height_m).unwrap();
-    walk
-}
-
-#[test]
-fn a_walk_that_fits_poorly_is_a_double_also_where_it_is_smaller() {
-    let (poor, good) = (|walk| fitted(walk, 0.15), |walk| fitted(walk, 0.01));
-    let are = |a: &TrackedWalk, b: &TrackedWalk| [a.is_double_of(b), b.is_double_of(a)];
-    let (long, short) = (beside(-0.5, 0, 30), beside(-0.48, 4, 18));
-    assert_eq!(are(&good(long.clone()), &smaller(good(short.clone()))), [false, false]);
-    assert_eq!(are(&poor(long.clone()), &smaller(poor(short.clone()))), [false, false]);
-    assert_eq!(are(&good(long.clone()), &smaller(poor(short.clone()))), [false, true]);
-    assert_eq!(are(&good(long.clone()), &smaller(poor(beside(-0.3, 4, 18)))), [false, false], "beside");
-    assert_eq!(
-        are(&smaller(poor(long.clone())), &good(short.clone())),
-        [true, false],
-        "most of it is common"
-    );
-    // Of a long one that is off at last, most is not common to both.
-    assert_eq!(are(&smaller(poor(beside(-0.5, 0, 50))), &good(short.clone())), [false, true]);
-    assert_eq!(are(&poor(long), &good(short)), [true, false]);
 }
 
 /// The twins' similarities tell the sides of a model that is on the person only.

@@ -2,6 +2,7 @@
 
 use super::super::active::Active;
 use super::super::before::Beside;
+use super::super::double::are_at_a_time;
 use super::super::evidence::Evidence;
 use super::super::fit::views::Backdrop;
 use super::super::fit::{FitError, WalkFit};
@@ -94,12 +95,19 @@ impl Tracker {
             return self.withdraw(active.person, walk_boxes, reason);
         }
         let sign = standing.or_else(|| active.sign());
+        let others = || self.finished.iter().chain(&self.returned);
+        let views = match others().any(|other| are_at_a_time(active.steps(), other.steps())) {
+            true => active.views(&self.backdrop),
+            false => Vec::new(),
+        };
         let walk = self.tracked(active, fit);
         // Two models can come to lie on one person, the fitted ones too.
-        if self.finished.iter().chain(&self.returned).any(|other| walk.is_double_of(other)) {
+        let second = |other: &TrackedWalk| walk.is_second_model(other, &views);
+        let seconds: Vec<Option<bool>> = self.finished.iter().map(second).collect();
+        if seconds.contains(&Some(true)) || self.returned.iter().any(|other| second(other) == Some(true)) {
             return self.withdraw(walk.person, walk_boxes, Reason::Beside);
         }
-        if let Some(k) = self.finished.iter().position(|other| other.is_double_of(&walk)) {
+        if let Some(k) = seconds.iter().position(|second| *second == Some(false)) {
             let double = self.finished.remove(k);
             self.withdraw(double.person, None, Reason::Beside);
         }
