@@ -4,7 +4,7 @@
 //! somebody lies mostly on the same body, and where it does not, nobody is. How far the two lie on each other does not tell
 //! this: of people side by side, the boxes overlap as much as those of second models that are off.
 //!
-//! 1. In each frame of both walks, pixels are told apart that are on one body only, on the other only, and on both.
+//! 1. In each frame of both walks, the pixels are counted that are on the first body only, on the second one only, and on both.
 //! 2. A pixel shows somebody if it differs from the empty scene by half of what the pixels on both differ by (median).
 //! 3. The own share of a body is the share of it that is not on the other and shows somebody, divided by the share of what is on both
 //!    that does. If one of them has hardly any, both are of one person.

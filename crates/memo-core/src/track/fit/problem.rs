@@ -9,9 +9,10 @@ use super::normal::{Chain, FigureTerms};
 use super::route::{Bend, figure_slopes};
 use super::seen::{LEAST_STEP, Seen};
 use super::unknowns::{
-    BEND, BODY, FRAME, FRAME_ALONG, FRAME_ANGLES, FRAME_HEIGHT, FRAME_PHASE, GROUND, JOINTS, Prior, SHANK,
-    STATURE, Slope, THIGH, THIGH_OVER_SHANK, Unknowns, WHOLE, WHOLE_ACROSS, WHOLE_BEND, WHOLE_GROUND,
-    WHOLE_HEADING, WHOLE_LEAN, body, excess, flatten, length, mean_of, posture, priors, slopes, sway_m,
+    BEND, BODY, FRAME, FRAME_ALONG, FRAME_ANGLES, FRAME_HEIGHT, FRAME_PHASE, GROUND, JOINTS, LEAN_SD_RAD,
+    Prior, SHANK, STATURE, Slope, THIGH, THIGH_OVER_SHANK, Unknowns, WHOLE, WHOLE_ACROSS, WHOLE_BEND,
+    WHOLE_GROUND, WHOLE_HEADING, WHOLE_LEAN, body, excess, flatten, length, mean_of, posture, priors, slopes,
+    sway_m,
 };
 use super::{FitError, FitOptions, LEAST_FRAMES, WalkFit, sides};
 use crate::estimate::arrow::{Arrow, FrameTerms, Solution, velocity_change};
@@ -134,7 +135,7 @@ const MOST_START_COST: f64 = 1.3;
 /// From where a trunk starts that leans: two standard deviations over people from the mean. What shows of somebody behind another
 /// may be too little to reach it from there: of a pair who walk side by side, the head of the farther one, who leans back by twice
 /// the usual, was sought behind that of the nearer one, 20 cm ahead of its own and 9 cm above it.
-const START_LEAN_RAD: f64 = 0.16;
+const START_LEAN_RAD: f64 = 2.0 * LEAN_SD_RAD;
 
 /// What is fitted in a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -685,8 +686,8 @@ pub(super) struct Width {
     height_px: f64,
     /// What the edge of a sole counts in the step, of what it counts in the cost.
     sole: f64,
-    /// False while the person is still moved to the ground, which then says nothing of the lengths of the legs: those of a person
-    /// who starts too low would become short, and the feet be sought in the shanks.
+    /// False in the steps that move the person to the ground. There the ground does not change the lengths of the legs: a person
+    /// who starts too low would get short legs, and the feet would be sought in the shanks.
     is_placed: bool,
 }
 

@@ -128,6 +128,9 @@ pub fn flatten(gait: &Gait, whole: &mut [f64], joint: usize, side: usize, share:
 /// with 0.020, the sixth person is 66 cm too far away in one of six.
 const FLOOR_SD_M: f64 = 0.010;
 
+/// Standard deviation over people of the lean of the trunk.
+pub const LEAN_SD_RAD: f64 = 0.08;
+
 /// Mean and standard deviation over people of an unknown.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Prior {
@@ -173,7 +176,7 @@ pub fn priors() -> Vec<Prior> {
         (HEEL, 0.0, 0.008),
         (HIP_WIDTH, -0.003, 0.008),
         (SHOULDER_WIDTH, -0.01, 0.012),
-        (WHOLE_LEAN, 0.03, 0.08),
+        (WHOLE_LEAN, 0.03, LEAN_SD_RAD),
         (WHOLE_HEADING, 0.0, 0.1),
         (WHOLE_ACROSS, 0.0, 0.5),
         // The right hip is ahead at right heel strike, by 4 degrees.
