@@ -1025,6 +1025,7 @@ def results():
             {"head": 0.5},
             ["left shank"],
             {"thigh": 0.4},
+            {"right_hip_deg": 1.1, "phase": 0.02},
             np.zeros((2, 5, 50)),
         ),
         *_memo.unswap(walk.times_s, shown.positions_px, groups={"legs": {"hip": [(6, 9)]}}).values(),

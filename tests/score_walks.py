@@ -89,7 +89,7 @@ class Timing:
 
 @dataclass(frozen=True)
 class Claim:
-    """The mean error of a quantity over the frames and the standard deviation stated for it."""
+    """The mean error of a quantity over the frames and the standard deviation stated for this mean."""
 
     error: float
     sd: float
@@ -189,10 +189,12 @@ def score(
     truth: gt.Columns,
     true_events: gt.Columns,
     camera_m: Sequence[float],
+    mean_sds: Sequence[Mapping[str, float]] = (),
 ) -> ClipScore:
     """The figures of a track: its columns, its events and its gait parameters against those of the truth.
 
-    `camera_m` is where the camera stands, world x and y.
+    `camera_m` is where the camera stands, world x and y; `mean_sds` are the standard deviations of the means
+    over each walk, none if nothing is stated.
     """
     true = true_gait(truth, true_events)
     common: dict[str, Any] = {
@@ -228,6 +230,7 @@ def score(
         for joint, angle in true_deg.items()
         if f"{joint}_deg" in here
     }
+    place = {"along_m": torso @ forward, "across_m": torso @ away, "height_m": torso[:, 2]}
     return ClipScore(
         name,
         coverage=in_truth.size / truth["frame"].size,
@@ -235,11 +238,11 @@ def score(
         sides=_sides(here, phase),
         rms_deg={joint: _both_sides_rms(errors_deg, joint, centred=False) for joint in JOINTS},
         centred_deg={joint: _both_sides_rms(errors_deg, joint, centred=True) for joint in JOINTS},
-        along_m=_rms(torso @ forward),
-        height_m=_rms(torso[:, 2]),
-        distance_m=_rms(torso @ away),
-        distance_bias_m=_mean(torso @ away),
-        claims=_claims(here, torso, forward, away, {"phase": phase, **stated_deg}),
+        along_m=_rms(place["along_m"]),
+        height_m=_rms(place["height_m"]),
+        distance_m=_rms(place["across_m"]),
+        distance_bias_m=_mean(place["across_m"]),
+        claims=_claims(here, {**place, "phase": phase, **stated_deg}, mean_sds),
         **common,
     )
 
@@ -286,32 +289,27 @@ def _both_sides_rms(errors: Mapping[str, np.ndarray], joint: str, *, centred: bo
 
 
 def _claims(
-    track: gt.Columns,
-    torso: np.ndarray,
-    forward: np.ndarray,
-    away: np.ndarray,
-    sided: Mapping[str, np.ndarray],
+    track: gt.Columns, errors: Mapping[str, np.ndarray], mean_sds: Sequence[Mapping[str, float]]
 ) -> dict[str, Claim]:
-    """Mean errors of all quantities for which the track states a standard deviation.
+    """Mean errors of all quantities for whose mean over a walk the track states a standard deviation.
 
-    The standard deviation of the mean over the frames is taken to be the mean of those of the frames: what
-    they state comes mostly from errors that all frames have in common (the height given, the average body,
-    the fit to the person), which do not average out. Those of the world axes are combined as if independent.
-    Quantities in `sided` count only in walks whose sides memo does not leave open.
+    Over several walks, the standard deviation is the mean of those of the rows. Angles and the phase count
+    only in walks whose sides memo does not leave open.
     """
+    if not mean_sds:
+        return {}
     claims = {}
-    if all(f"sd_{axis}_m" in track for axis in "xyz"):
-        sd = np.stack([track[f"sd_{axis}_m"] for axis in "xyz"], axis=1)
-        ways = {"along": forward, "distance": away, "height": np.array([0.0, 0.0, 1.0])}
-        for name, way in ways.items():
-            claims[name] = Claim(_mean(torso @ way), _mean(np.hypot.reduce(sd * way, axis=1)))
     sure = track["p_swapped"] <= OPEN
-    for name, error in sided.items():
-        if f"sd_{name}" in track:
-            rows = sure & np.isfinite(error)
+    for name, error in errors.items():
+        quantity = name.removesuffix("_m").removesuffix("_deg")
+        of_walks = np.array([sds.get(name, math.nan) for sds in mean_sds])
+        sd = of_walks[track["walk"].astype(int)]
+        is_place = name.endswith("_m")
+        rows = np.isfinite(error) & np.isfinite(sd) & (is_place | sure)
+        if rows.any():
             mean = gt.circular_mean(error[rows], 1.0) if name == "phase" else _mean(error[rows])
-            claims[name.removesuffix("_deg")] = Claim(mean, _mean(track[f"sd_{name}"][rows]))
-    return {name: c for name, c in claims.items() if math.isfinite(c.error) and math.isfinite(c.sd)}
+            claims["distance" if quantity == "across" else quantity] = Claim(mean, _mean(sd[rows]))
+    return claims
 
 
 def event_timing(events: Sequence[Mapping[str, Any]], true: gt.Columns, kind: str) -> Timing:
@@ -428,6 +426,7 @@ def track_clip(clip: Clip) -> ClipScore:
         gt.read_columns(clip.folder / "truth.csv"),
         gt.read_columns(clip.folder / "events.csv"),
         camera.position,
+        [walk.fit.mean_sd if walk.fit else {} for walk in found.walks],
     )
 
 

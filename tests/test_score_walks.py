@@ -153,7 +153,7 @@ def test_sides_are_right_wrong_or_open(shift, p_swapped, sides):
     track = track_of(Walker())
     track["phase"] = (track["phase"] + shift) % 1.0
     track["p_swapped"][:] = p_swapped
-    clip = scored(Walker(), track)
+    clip = scored(Walker(), track, mean_sds=[{"phase": 0.02}])
     assert clip.sides == sides
     assert ("phase" in clip.claims) == (sides[2] == 0)
     if sides[1]:  # a claim of the wrong side is a wrong phase
@@ -182,26 +182,26 @@ def test_events_are_matched_to_the_nearest_of_their_side_and_kind():
     assert figures["contacts_sd_ms"] == pytest.approx(np.sqrt(2.0) * 80.0)
 
 
-def test_claims_are_mean_errors_with_the_sd_of_their_direction():
+def test_claims_are_mean_errors_with_the_sd_of_their_means():
     walker = Walker(HEADING)
     track = track_of(walker)
     for i, axis in enumerate("xyz"):
         track[f"{axis}_m"] += 0.03 * walker.forward[i] - 0.2 * walker.left[i] + 0.05 * UP[i]
-    track |= {"sd_x_m": np.full(100, 0.04), "sd_y_m": np.full(100, 0.1), "sd_z_m": np.full(100, 0.06)}
-    track["sd_z_m"][50:] = 0.02
     track["phase"] = (track["phase"] - 0.03) % 1.0
     track["right_knee_deg"] += 5.0 + 8.0 * EVERY_SECOND
     track["left_hip_deg"] -= 5.0
-    track |= {"sd_right_knee_deg": np.full(100, 3.1), "sd_left_hip_deg": np.full(100, 3.0)}
-    clip = scored(walker, track)
-    c, s = np.cos(HEADING), np.sin(HEADING)
+    track["left_hip_deg"][60:] += 3.0
+    track["walk"][60:] = 1.0
+    place = {"along_m": 0.02, "across_m": 0.1, "height_m": 0.04, "phase": 0.02}
+    stated = [
+        {**place, "right_knee_deg": 3.1, "left_hip_deg": 3.0},
+        {**place, "height_m": 0.06, "right_knee_deg": 3.1},
+    ]
+    clip = scored(walker, track, mean_sds=stated)
     expected = {
-        "along": (0.03, np.hypot(0.04 * c, 0.1 * s)),
-        "distance": (-0.2, np.hypot(0.04 * s, 0.1 * c)),
-        "height": (0.05, 0.04),
-        "phase": (-0.03, 0.02),
+        **{"along": (0.03, 0.02), "distance": (-0.2, 0.1), "height": (0.05, 0.048), "phase": (-0.03, 0.02)},
         "right_knee": (5.0, 3.1),
-        "left_hip": (-5.0, 3.0),
+        "left_hip": (-5.0, 3.0),  # of the second walk, nothing is stated
     }
     assert clip.claims.keys() == expected.keys()
     for name, claim in clip.claims.items():
@@ -214,8 +214,8 @@ def test_claims_are_mean_errors_with_the_sd_of_their_direction():
 
 
 def test_without_stated_sd_nothing_is_claimed():
-    track = {n: c for n, c in track_of(Walker()).items() if not n.startswith("sd_")}
-    assert scored(Walker(), track).claims == {}
+    assert scored(Walker(), track_of(Walker())).claims == {}
+    assert scored(Walker(), track_of(Walker()), mean_sds=[{}]).claims == {}
 
 
 def gait_walker() -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
@@ -397,7 +397,8 @@ def test_a_stored_run_is_read_back_and_stands_beside_the_new(tmp_path):
     wrong.angles_deg["right_hip"] = wrong.angles_deg["right_hip"] + 4.0
     table = gait_table([("cadence", "", "1/min", 100.0, 99.0, 101.0), ("other", "", "s", 1.0, 0.5, 1.5)])
     events = as_tracked(strikes_of(walker))
-    before = [scored(walker, track_of(wrong), name=n, gait=table, events=events) for n in ("ANTO__x", "gone")]
+    given = {"gait": table, "events": events, "mean_sds": [{"right_hip_deg": 2.0}]}
+    before = [scored(walker, track_of(wrong), name=n, **given) for n in ("ANTO__x", "gone")]
     now = [scored(walker, track_of(walker), gait=table, events=events)]
     write_json(tmp_path / "run.json", sw.stored(before, demo(tmp_path)))
     read, demo_read = sw.read_stored(tmp_path / "run.json")

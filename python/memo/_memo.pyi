@@ -501,6 +501,10 @@ class WalkFit:
     worst first."""
     lengths_m: Final[dict[str, float]]
     """Lengths of the body, metres: ankle_height, shank, thigh, torso, stature, upper_arm, forearm."""
+    mean_sd: Final[dict[str, float]]
+    """Standard deviations of the means over the frames of the walk: of the measured angles (`right_hip_deg`
+    ...), of the torso's centre (`along_m`, `across_m` and `height_m`, of the path) and of the phase (`phase`,
+    cycles)."""
     curves_deg: Final[npt.NDArray[np.float64]]
     """The person's curves at fifty equally spaced phases from initial contact, (2, 5, 50) degrees: right and
     left; hip, knee, ankle, shoulder, elbow. NaN where a joint was not measured."""

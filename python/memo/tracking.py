@@ -702,6 +702,7 @@ def _fit(walk: _memo.Walk) -> dict[str, Any]:
         "worst_length_sd": fit.worst_length_sd,
         "crown_off_percent": None if fit.crown_off is None else 100 * fit.crown_off,
         "lengths_m": fit.lengths_m,
+        "mean_sd": fit.mean_sd,
     }
 
 

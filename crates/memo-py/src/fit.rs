@@ -3,14 +3,14 @@
 use crate::result::result;
 use memo_core::Body;
 use memo_core::model::Part;
-use memo_core::track::fit::{self, PartQuality};
+use memo_core::track::fit::{self, MeanSd, PartQuality};
 use numpy::{PyArray1, PyArrayDyn, PyArrayMethods};
 use pyo3::prelude::*;
 use std::collections::BTreeMap;
 
 result! {
     /// The measured person of a walk: how well the model fits, and the person's own body and curves.
-    WalkFit |py, fit: &fit::WalkFit| {
+    WalkFit |py, fit: &fit::WalkFit, mean_sd: &MeanSd| {
         /// Mean distance of the edges from the outline of the model, pixels.
         residual_px: f64 = fit.quality.residual_px,
         /// Height of the person in the middle of the walk, pixels.
@@ -40,6 +40,9 @@ result! {
         off_parts: Vec<String> = fit.quality.off_parts().into_iter().map(|part| part.name().to_owned()).collect::<Vec<_>>(),
         /// Lengths of the body, metres: ankle_height, shank, thigh, torso, stature, upper_arm, forearm.
         lengths_m: BTreeMap<String, f64> = lengths_m(&fit.body),
+        /// Standard deviations of the means over the frames of the walk: of the measured angles (`right_hip_deg` ...), of the
+        /// torso's centre (`along_m`, `across_m` and `height_m`, of the path) and of the phase (`phase`, cycles).
+        mean_sd: BTreeMap<String, f64> = of_means(mean_sd),
         /// The person's curves at fifty equally spaced phases from initial contact, (2, 5, 50) degrees: right and
         /// left; hip, knee, ankle, shoulder, elbow. NaN where a joint was not measured.
         curves_deg: Py<PyArrayDyn<f64>> = curves_deg(py, fit)?,
@@ -51,6 +54,16 @@ result! {
 fn of_parts(fit: &fit::WalkFit, of: impl Fn(&PartQuality) -> Option<f64>) -> BTreeMap<String, f64> {
     let known = Part::ALL.iter().zip(&fit.quality.parts);
     known.filter_map(|(part, quality)| Some((part.name().to_owned(), of(quality.as_ref()?)?))).collect()
+}
+
+/// The standard deviations by the names of what they are of.
+fn of_means(sd: &MeanSd) -> BTreeMap<String, f64> {
+    let joints = ["right", "left"].into_iter().zip(&sd.angles).flat_map(|(side, angles)| {
+        let named = ["hip", "knee", "ankle", "shoulder", "elbow"].into_iter().zip(angles);
+        named.filter_map(move |(joint, sd)| Some((format!("{side}_{joint}_deg"), (*sd)?.to_degrees())))
+    });
+    let place = ["along_m", "across_m", "height_m", "phase"].map(str::to_owned).into_iter().zip(sd.place);
+    joints.chain(place).collect()
 }
 
 /// Lengths between the joints, metres.

@@ -208,8 +208,10 @@ result! {
         treadmill: Option<Py<Treadmill>> =
             walk.treadmill().map(|found| Py::new(py, Treadmill::of(py, &found)?)).transpose()?,
         /// The measured person; None if there was no fit, or if it failed.
-        fit: Option<Py<WalkFit>> =
-            walk.fitted().map(|fit| Py::new(py, WalkFit::of(py, fit)?)).transpose()?,
+        fit: Option<Py<WalkFit>> = {
+            let found = walk.fitted().zip(walk.mean_sd());
+            found.map(|(fit, sd)| Py::new(py, WalkFit::of(py, fit, &sd)?)).transpose()?
+        },
         /// Why no person was measured; None if there is a fit, or if none was asked for.
         fit_problem: Option<String> =
             walk.fit.as_ref().and_then(|fit| fit.as_ref().err()).map(ToString::to_string),

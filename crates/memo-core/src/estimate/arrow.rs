@@ -234,6 +234,27 @@ pub struct Solution {
 }
 
 impl Solution {
+    /// Variance of a linear form of the unknowns of the whole and of any frames, for example of a mean over all of
+    /// them, with indices by [`Arrow::index`].
+    ///
+    /// With e the form's part over the frames, a that over the whole, L u = e and d = a - Y u: uᵀ u + dᵀ S⁻¹ d.
+    pub fn variance(&self, whole: &[(usize, f64)], frames: &[(usize, f64)]) -> f64 {
+        let mut u = DVector::zeros(self.coupling.ncols());
+        for &(i, a) in frames {
+            u[i] += a;
+        }
+        for i in 0..u.len() {
+            let (first, row) = (self.factor.first(i), self.factor.row(i));
+            let (before, diagonal) = row.split_at(i - first);
+            u[i] = (u[i] - dot(before, &u.as_slice()[first..i])) / diagonal[0];
+        }
+        let mut left = -(&self.coupling * &u);
+        for &(i, a) in whole {
+            left[i] += a;
+        }
+        u.norm_squared() + left.dot(&self.schur.solve(&left))
+    }
+
     /// The covariance of the unknowns, as far as neighbouring frames go, in time that is linear in their number.
     ///
     /// Entries Z = F⁻¹ within the band follow from L Lᵀ Z = 1, whose lower triangle is that of Lᵀ Z = L⁻¹: from the last
@@ -401,9 +422,21 @@ mod tests {
                 of_whole.iter().for_each(|&(i, a): &(usize, f64)| form[i] += a);
                 of_frames.iter().for_each(|&(i, a): &(usize, f64)| form[whole + i] += a);
                 let dense = form.dot(&(&inverse * &form));
-                let found = covariance.variance(&of_whole, &of_frames);
-                assert!((found - dense).abs() < 1e-8 * dense.max(1.0), "{found} against {dense}");
+                let found =
+                    [covariance.variance(&of_whole, &of_frames), solution.variance(&of_whole, &of_frames)];
+                for found in found {
+                    assert!((found - dense).abs() < 1e-8 * dense.max(1.0), "{found} against {dense}");
+                }
             }
+            // A mean over frames that are far apart, one of them twice.
+            let everywhere: Vec<_> =
+                (0..frames).chain([0]).map(|k| (k * block, 1.0 / frames as f64)).collect();
+            let mut form = DVector::zeros(whole + frames * block);
+            form[whole - 1] = -0.5;
+            everywhere.iter().for_each(|&(i, a)| form[whole + i] += a);
+            let dense = form.dot(&(&inverse * &form));
+            let found = solution.variance(&[(whole - 1, -0.5)], &everywhere);
+            assert!((found - dense).abs() < 1e-8 * dense.max(1.0), "{found} against {dense}");
         }
     }
 

@@ -8,7 +8,7 @@
 use super::decisions::{ACROSS_SD_M, COMMON_PHASE_SD};
 use super::event::EventKind;
 use super::fit::contacts::Contact;
-use super::fit::{FitError, FittedFrame, Measured, WalkFit};
+use super::fit::{FitError, FittedFrame, MeanSd, Measured, WalkFit};
 use super::height::{BodyHeight, HeightSource};
 use super::route::Route;
 use super::search::{Hypothesis, Scene};
@@ -206,7 +206,7 @@ impl TrackedWalk {
         let frame = &fit.frames[k];
         let posed = fit.pose(k);
         let ahead = DVec2::from_angle(frame.heading_rad);
-        let [along, across, height, phase] = self.with_scale(frame);
+        let [along, across, height, phase] = self.with_scale(frame, frame.sd);
         let phase_at = frame.phase.rem_euclid(1.0);
         Row {
             frame: step.frame,
@@ -235,9 +235,17 @@ impl TrackedWalk {
         }
     }
 
-    /// Standard deviations of a fitted frame. An assumed height scales the walk about the camera's foot point.
-    fn with_scale(&self, frame: &FittedFrame) -> [f64; 4] {
-        let [along, across, height, phase] = frame.sd;
+    /// Standard deviations of the means over the frames that were fitted; `None` without a fit. Those of the place are of an
+    /// assumed height too.
+    pub fn mean_sd(&self) -> Option<MeanSd> {
+        let fit = self.fitted()?;
+        let MeanSd { angles, place } = fit.mean_sd;
+        Some(MeanSd { angles, place: self.with_scale(&fit.frames[fit.frames.len() / 2], place) })
+    }
+
+    /// Standard deviations near a fitted frame. An assumed height scales the walk about the camera's foot point.
+    fn with_scale(&self, frame: &FittedFrame, sd: [f64; 4]) -> [f64; 4] {
+        let [along, across, height, phase] = sd;
         let scale_sd = self.height.assumed_scale_sd();
         let (eye, path) = (self.camera.position().truncate(), self.route().at(frame.along_m));
         let off_axis_m = frame.along_m - path.along(eye);

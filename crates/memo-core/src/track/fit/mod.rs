@@ -162,6 +162,16 @@ pub struct FittedFrame {
     pub sd: [f64; 4],
 }
 
+/// Standard deviations of means over the frames of a walk: of errors that all frames have in common, which do not
+/// average out.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct MeanSd {
+    /// Of the angles, right then left: hip, knee, ankle, shoulder, elbow, radians; `None` if no frame shows the limb.
+    pub angles: [[Option<f64>; JOINTS]; 2],
+    /// Of the torso's centre along the path, across it and in height (metres), and of the phase.
+    pub place: [f64; 4],
+}
+
 /// The measured person.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WalkFit {
@@ -177,6 +187,8 @@ pub struct WalkFit {
     pub curves: [Vec<f64>; 2 * JOINTS],
     /// One entry per frame of the walk.
     pub frames: Vec<FittedFrame>,
+    /// Standard deviations of the means over the frames that were fitted.
+    pub mean_sd: MeanSd,
     /// Initial contacts and toe-offs, in order of time.
     pub contacts: Vec<Contact>,
     /// Probability that left and right are exchanged.

@@ -260,12 +260,19 @@ impl WalkFit {
     fn add_tilt(&mut self, camera: &Camera, tilt: &TiltEstimate) {
         let level = |axis: DVec3| (camera.rotation.transpose() * axis).truncate().normalize_or_zero();
         let (right, ahead) = (level(DVec3::X), level(DVec3::Z));
+        let sd_rad = |heading_rad: f64| {
+            let across = DVec2::from_angle(heading_rad).perp();
+            (tilt.roll_sd_rad * ahead.dot(across)).hypot(tilt.pitch_sd_rad * right.dot(across))
+        };
         for frame in &mut self.frames {
-            let across = DVec2::from_angle(frame.heading_rad).perp();
-            let sd_rad = (tilt.roll_sd_rad * ahead.dot(across)).hypot(tilt.pitch_sd_rad * right.dot(across));
+            let sd_rad = sd_rad(frame.heading_rad);
             for [hip, _, _, shoulder, _] in frame.measured.iter_mut().map(|side| &mut side.angles) {
                 hip.iter_mut().chain(shoulder).for_each(|[_, sd]| *sd = sd.hypot(sd_rad));
             }
+        }
+        let all_sd = sd_rad(self.frames[self.frames.len() / 2].heading_rad);
+        for [hip, _, _, shoulder, _] in &mut self.mean_sd.angles {
+            hip.iter_mut().chain(shoulder).for_each(|sd| *sd = sd.hypot(all_sd));
         }
     }
 }

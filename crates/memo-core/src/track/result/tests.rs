@@ -6,7 +6,7 @@ use super::super::walk::{Beginning, Look, State};
 use super::*;
 use crate::estimate::kalman::FilterOptions;
 use crate::synth::Random;
-use crate::track::fit::FitQuality;
+use crate::track::fit::{FitQuality, MeanSd};
 use glam::DVec2;
 
 /// A walk at 1.2 m/s and 0.9 Hz along a path, one hypothesis per frame; for frames without one the filter only
@@ -331,6 +331,7 @@ pub fn fitted(walk: TrackedWalk, missed: f64) -> TrackedWalk {
         height: None,
         route: walk.walk.route.clone(),
         curves: std::array::from_fn(|_| vec![0.0; 50]),
+        mean_sd: MeanSd::default(),
         frames: walk.rows().iter().map(frame).collect(),
         contacts: Vec::new(),
         p_swapped: 0.0,

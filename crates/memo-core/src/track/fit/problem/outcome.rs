@@ -1,8 +1,8 @@
 //! What a fit says of the person: body, motion, contacts, and how well the model fits, with standard deviations.
 
 use super::super::super::decisions::{
-    FIT_PLACE_SD, HEIGHT_MODEL_SD_M, MODEL_SD_RAD, MOST_SD_RAD, OFF_ACROSS_SD_M, OFF_SD_RAD, SD_FACTOR,
-    ZERO_BLUR_PX, ZERO_SD,
+    FIT_PLACE_SD, HEIGHT_MODEL_SD_M, MEAN_MODEL_SD_RAD, MEAN_OFF_ACROSS_SD_M, MEAN_OFF_SD_RAD, MEAN_PLACE_SD,
+    MODEL_SD_RAD, MOST_SD_RAD, OFF_ACROSS_SD_M, OFF_SD_RAD, SD_FACTOR, ZERO_BLUR_PX, ZERO_SD,
 };
 use super::super::belt::{self, Belt};
 use super::super::contacts::{self, Feet};
@@ -10,7 +10,7 @@ use super::super::unknowns::{
     self, ANGLES, FRAME, FRAME_ALONG, FRAME_HEIGHT, FRAME_PHASE, JOINTS, Prior, STATURE, TORSO, Unknowns,
     WHOLE, WHOLE_ACROSS, WHOLE_BEND, WHOLE_HEADING, WHOLE_LEAN, body, excess, posture, slopes,
 };
-use super::super::{FitQuality, FittedFrame, Measured, PartQuality, WalkFit};
+use super::super::{FitQuality, FittedFrame, MeanSd, Measured, PartQuality, WalkFit};
 use super::{Fitted, Problem};
 use crate::estimate::arrow::Covariance;
 use crate::estimate::median::median;
@@ -113,6 +113,7 @@ impl Problem<'_> {
             height: self.height(fitted, covariance, &quality),
             route,
             curves,
+            mean_sd: self.mean_sd(fitted, &all),
             frames: all,
             contacts,
             p_swapped,
@@ -154,18 +155,11 @@ impl Problem<'_> {
     fn measured(&self, fitted: &Fitted, covariance: &Covariance, frame: usize) -> [Measured; 2] {
         let (unknowns, off) = (&fitted.unknowns, fitted.seen.off());
         let angles = unknowns::angles(&self.walker.gait, &unknowns.whole, &unknowns.frames[frame]);
-        let mut all = Vec::new();
-        slopes(&self.walker.gait, &unknowns.whole, &unknowns.frames[frame], &mut all);
+        let forms = self.angle_forms(unknowns, frame);
         let measured = |at: usize| {
-            let (mut whole, mut frames) = (Vec::new(), Vec::new());
-            for &(_, unknown, slope) in all.iter().filter(|s| s.0 == ANGLES + at) {
-                match unknown.checked_sub(WHOLE) {
-                    None => whole.push((unknown, slope)),
-                    Some(unknown) => frames.push((frame * FRAME + unknown, slope)),
-                }
-            }
+            let Form { whole, frames } = &forms[at];
             let [sd, most] =
-                [SD_FACTOR * covariance.variance(&whole, &frames).sqrt(), MOST_SD_RAD[at % JOINTS]];
+                [SD_FACTOR * covariance.variance(whole, frames).sqrt(), MOST_SD_RAD[at % JOINTS]];
             let sd = sd.hypot(MODEL_SD_RAD[at % JOINTS]).hypot(OFF_SD_RAD * off);
             (sd <= most).then_some([angles[at], sd])
         };
@@ -174,26 +168,94 @@ impl Problem<'_> {
 
     /// Standard deviations of the torso's centre along, across and up, and of the phase.
     fn place_sd(&self, fitted: &Fitted, covariance: &Covariance, frame: usize) -> [f64; 4] {
-        let (height_m, lean) = (self.walker.body.height_m, fitted.unknowns.whole[WHOLE_LEAN]);
-        let half_m = 0.5 * body(&self.walker.body, &fitted.unknowns.whole).torso_length_m();
-        let along_m = fitted.unknowns.frames[frame][FRAME_ALONG];
-        let at = |unknown: usize| [(frame * FRAME + unknown, 1.0)];
-        let sd = |whole: &[(usize, f64)], frames: &[(usize, f64)], common: f64| {
-            (SD_FACTOR * covariance.variance(whole, frames).sqrt()).hypot(common)
+        let forms = self.place_forms(&fitted.unknowns, frame);
+        let mut sd = std::array::from_fn(|at| {
+            let Form { whole, frames } = &forms[at];
+            (SD_FACTOR * covariance.variance(whole, frames).sqrt()).hypot(FIT_PLACE_SD[at])
+        });
+        sd[ACROSS] = sd[ACROSS].hypot(OFF_ACROSS_SD_M * fitted.seen.off());
+        sd
+    }
+
+    /// Standard deviations of means over the frames: of each angle over those that show the limb, of the place over all.
+    fn mean_sd(&self, fitted: &Fitted, frames: &[FittedFrame]) -> MeanSd {
+        let (unknowns, off) = (&fitted.unknowns, fitted.seen.off());
+        let sd = |mean: &Form| SD_FACTOR * fitted.solution.variance(&mean.whole, &mean.frames).sqrt();
+        // 1. The angles.
+        let angle_forms: Vec<_> = (0..frames.len()).map(|k| self.angle_forms(unknowns, k)).collect();
+        let of_angle = |side: usize, joint: usize| {
+            let is_shown = |k: &usize| frames[*k].measured[side].angles[joint].is_some();
+            let shown: Vec<usize> = (0..frames.len()).filter(is_shown).collect();
+            let mean = Form::mean(shown.iter().map(|&k| &angle_forms[k][side * JOINTS + joint]))?;
+            Some(sd(&mean).hypot(MEAN_MODEL_SD_RAD[joint]).hypot(MEAN_OFF_SD_RAD * off))
         };
+        let angles = [0, 1].map(|side| std::array::from_fn(|joint| of_angle(side, joint)));
+        // 2. The place.
+        let place_forms: Vec<_> = (0..frames.len()).map(|k| self.place_forms(unknowns, k)).collect();
+        let mut place = std::array::from_fn(|at| {
+            let mean = Form::mean(place_forms.iter().map(|forms| &forms[at])).unwrap_or_default();
+            sd(&mean).hypot(MEAN_PLACE_SD[at])
+        });
+        place[ACROSS] = place[ACROSS].hypot(MEAN_OFF_ACROSS_SD_M * off);
+        MeanSd { angles, place }
+    }
+
+    /// How the angles of a frame, right then left, change with the unknowns.
+    pub(super) fn angle_forms(&self, unknowns: &Unknowns, frame: usize) -> [Form; 2 * JOINTS] {
+        let mut all = Vec::new();
+        slopes(&self.walker.gait, &unknowns.whole, &unknowns.frames[frame], &mut all);
+        let mut forms: [Form; 2 * JOINTS] = Default::default();
+        for (of, unknown, slope) in all {
+            let Some(form) = of.checked_sub(ANGLES).and_then(|at| forms.get_mut(at)) else { continue };
+            match unknown.checked_sub(WHOLE) {
+                None => form.whole.push((unknown, slope)),
+                Some(unknown) => form.frames.push((frame * FRAME + unknown, slope)),
+            }
+        }
+        forms
+    }
+
+    /// The same of the torso's centre along, across and up, and of the phase.
+    pub(super) fn place_forms(&self, unknowns: &Unknowns, frame: usize) -> [Form; 4] {
+        let (height_m, lean) = (self.walker.body.height_m, unknowns.whole[WHOLE_LEAN]);
+        let half_m = 0.5 * body(&self.walker.body, &unknowns.whole).torso_length_m();
         let half_torso = 0.5 * height_m;
+        let along_m = unknowns.frames[frame][FRAME_ALONG];
+        let at = |unknown: usize| vec![(frame * FRAME + unknown, 1.0)];
         let mut across = vec![(WHOLE_ACROSS, 1.0), (WHOLE_HEADING, along_m)];
         let bend = self.bend.map(|bend| bend.terms(self.origin_along_m + along_m));
         across.extend(bend.iter().flatten().enumerate().map(|(j, [moved, ..])| (WHOLE_BEND + j, *moved)));
+        let along = vec![(WHOLE_LEAN, half_m * lean.cos()), (TORSO, half_torso * lean.sin())];
+        let up = vec![(WHOLE_LEAN, -half_m * lean.sin()), (TORSO, half_torso * lean.cos())];
         [
-            sd(
-                &[(WHOLE_LEAN, half_m * lean.cos()), (TORSO, half_torso * lean.sin())],
-                &at(FRAME_ALONG),
-                FIT_PLACE_SD[0],
-            ),
-            sd(&across, &[], FIT_PLACE_SD[1].hypot(OFF_ACROSS_SD_M * fitted.seen.off())),
-            sd(&[(TORSO, half_torso * lean.cos())], &at(FRAME_HEIGHT), FIT_PLACE_SD[2]),
-            sd(&[], &at(FRAME_PHASE), FIT_PLACE_SD[3]),
+            Form { whole: along, frames: at(FRAME_ALONG) },
+            Form { whole: across, frames: Vec::new() },
+            Form { whole: up, frames: at(FRAME_HEIGHT) },
+            Form { whole: Vec::new(), frames: at(FRAME_PHASE) },
         ]
+    }
+}
+
+/// The place across the path, of the four of a place.
+const ACROSS: usize = 1;
+
+/// A linear form of the unknowns: those of the whole, and those of frames by their index among all, with their factors.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Form {
+    pub whole: Vec<(usize, f64)>,
+    pub frames: Vec<(usize, f64)>,
+}
+
+impl Form {
+    /// Their mean; `None` of none.
+    pub fn mean<'a>(forms: impl ExactSizeIterator<Item = &'a Self>) -> Option<Self> {
+        let share = 1.0 / forms.len() as f64;
+        let of = |terms: &[(usize, f64)]| terms.iter().map(|&(at, a)| (at, share * a)).collect::<Vec<_>>();
+        forms.fold(None, |mean: Option<Self>, form| {
+            let mut mean = mean.unwrap_or_default();
+            mean.whole.extend(of(&form.whole));
+            mean.frames.extend(of(&form.frames));
+            Some(mean)
+        })
     }
 }

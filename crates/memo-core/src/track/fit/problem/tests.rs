@@ -1,4 +1,5 @@
-use super::super::unknowns::{ALONG, CROWN, HEIGHT};
+use super::super::unknowns::{ALONG, CROWN, HEIGHT, angles};
+use super::outcome::Form;
 use super::*;
 use crate::image::Image;
 use crate::model::Body;
@@ -135,6 +136,70 @@ fn a_stiff_knee_is_measured() {
         let squares: f64 = (0..frames.len()).flat_map(off).sum();
         let rms_deg = (squares / (2 * frames.len()) as f64).sqrt().to_degrees();
         assert!(rms_deg < 1.5, "{side} {share}: {rms_deg}");
+    }
+}
+
+/// The forms of which standard deviations are stated are how the means over all frames change with the unknowns.
+#[test]
+fn means_change_as_their_forms_say() {
+    let Drawn { camera, walker, route, frames } = drawn();
+    let options = FitOptions::default();
+    let problem = Problem::new(&camera, &walker, &route, &frames, &options);
+    let start = problem.start(0.0);
+    let count = frames.len();
+    // What is said of: ten angles, the torso's centre along and up, and the phase, as means over the frames.
+    let means = |unknowns: &Unknowns| {
+        let mut sums = [0.0; 13];
+        for (k, frame) in unknowns.frames.iter().enumerate() {
+            let torso = problem.figure(unknowns, k).posed.torso_centre;
+            let angles = angles(&walker.gait, &unknowns.whole, frame);
+            let place = [route.along(torso.truncate(), frame[FRAME_ALONG]), torso.z, frame[FRAME_PHASE]];
+            sums.iter_mut().zip(angles.into_iter().chain(place)).for_each(|(sum, x)| *sum += x);
+        }
+        sums.map(|sum| sum / count as f64)
+    };
+    let angle_forms: Vec<_> = (0..count).map(|k| problem.angle_forms(&start, k)).collect();
+    let place_forms: Vec<_> = (0..count).map(|k| problem.place_forms(&start, k)).collect();
+    let of_angles = (0..2 * JOINTS).map(|at| Form::mean(angle_forms.iter().map(|forms| &forms[at])));
+    let of_place = [0, 2, 3].map(|at| Form::mean(place_forms.iter().map(|forms| &forms[at])));
+    let forms: Vec<Form> = of_angles.chain(of_place).map(Option::unwrap).collect();
+    // Every unknown of the joints, the place and the phase is moved by another small amount.
+    let moved = |sign: f64| {
+        let mut unknowns = start.clone();
+        let steps = (0..).map(|n| sign * 1e-5 * f64::from(n % 7 - 3));
+        unknowns.whole.iter_mut().zip(steps.clone()).for_each(|(x, step)| *x += step);
+        unknowns.frames.iter_mut().flatten().zip(steps).for_each(|(x, step)| *x += step);
+        unknowns
+    };
+    let ends = [moved(1.0), moved(-1.0)];
+    let step = |of: fn(&Unknowns) -> Vec<f64>, at: usize| of(&ends[0])[at] - of(&ends[1])[at];
+    let [after, before] = ends.each_ref().map(means);
+    for (n, form) in forms.iter().enumerate() {
+        let whole = form.whole.iter().map(|&(at, a)| a * step(|u| u.whole.clone(), at));
+        let frames = form.frames.iter().map(|&(at, a)| a * step(|u| u.frames.concat(), at));
+        let said: f64 = whole.chain(frames).sum();
+        // A torso that sways to the side of a turned path is not said to be farther along it.
+        let near = if n == 2 * JOINTS { 2e-7 } else { 1e-9 };
+        assert!((after[n] - before[n] - said).abs() < near, "{n}: {} and {said}", after[n] - before[n]);
+    }
+    assert!(Form::mean([].iter()).is_none());
+}
+
+/// What is stated of the mean of an angle is less than what is stated of single frames.
+#[test]
+fn means_are_stated_narrower_than_frames() {
+    let Drawn { camera, walker, route, frames } = drawn();
+    let options = FitOptions::default();
+    let problem = Problem::new(&camera, &walker, &route, &frames, &options);
+    let fit = problem.fit(problem.start_gait(0.0).unwrap(), Some(0.1)).unwrap();
+    for (side, of_side) in fit.mean_sd.angles.iter().enumerate() {
+        for (joint, of_joint) in of_side.iter().enumerate() {
+            let stated: Vec<f64> =
+                fit.frames.iter().filter_map(|f| Some(f.measured[side].angles[joint]?[1])).collect();
+            assert_eq!(of_joint.is_some(), !stated.is_empty(), "{side} {joint}");
+            let least = stated.iter().copied().fold(f64::INFINITY, f64::min);
+            assert!(joint > 1 || of_joint.unwrap() < least, "{side} {joint}: {of_joint:?} and {least}");
+        }
     }
 }
 
