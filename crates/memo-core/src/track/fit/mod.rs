@@ -162,8 +162,8 @@ pub struct FittedFrame {
     pub sd: [f64; 4],
 }
 
-/// Standard deviations of means over the frames of a walk: of errors that all frames have in common, which do not
-/// average out.
+/// Standard deviations of means over the frames of a walk that were fitted, of an angle over those that show the limb: the
+/// errors of single frames average out, those that all frames have in common do not.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct MeanSd {
     /// Of the angles, right then left: hip, knee, ankle, shoulder, elbow, radians; `None` if no frame shows the limb.

@@ -147,7 +147,7 @@ fn means_change_as_their_forms_say() {
     let problem = Problem::new(&camera, &walker, &route, &frames, &options);
     let start = problem.start(0.0);
     let count = frames.len();
-    // What is said of: ten angles, the torso's centre along and up, and the phase, as means over the frames.
+    // The means over the frames of ten angles, of the place of the torso along the path and in height, and of the phase.
     let means = |unknowns: &Unknowns| {
         let mut sums = [0.0; 13];
         for (k, frame) in unknowns.frames.iter().enumerate() {
@@ -185,7 +185,7 @@ fn means_change_as_their_forms_say() {
     assert!(Form::mean([].iter()).is_none());
 }
 
-/// What is stated of the mean of an angle is less than what is stated of single frames.
+/// The standard deviation of the mean of an angle of a leg is smaller than those of single frames.
 #[test]
 fn means_are_stated_narrower_than_frames() {
     let Drawn { camera, walker, route, frames } = drawn();
