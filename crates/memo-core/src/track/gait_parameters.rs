@@ -294,7 +294,7 @@ impl TrackedWalk {
         let steps = steps_between(&strikes, &self.rows(), whole.belt.speed_mps);
         let (rate_hz, speed_mps) = (whole.rate_hz.value, whole.speed_mps.value.abs());
         let strike_sd_s = match self.fitted() {
-            Some(_) => CONTACT_SIDE_SD_S,
+            Some(_) => contact_shift_sd_s(),
             None => STRIKE_SD_CYCLES / rate_hz,
         };
         let noise_sq = steps.iter().map(|s| s.variance_s2).sum::<f64>() / steps.len().max(1) as f64;
@@ -568,11 +568,16 @@ struct BySide {
     symmetry: Option<Estimate>,
 }
 
+/// Standard deviation of a shift of one side's contacts: the difference between the sides has `CONTACT_SIDE_SD_S`.
+fn contact_shift_sd_s() -> f64 {
+    CONTACT_SIDE_SD_S / std::f64::consts::SQRT_2
+}
+
 /// Prior knowledge of a quantity's spread.
 struct Spread {
     /// Variance of single steps.
     prior_variance: f64,
-    /// Standard deviation of the shift common to all strikes of one side.
+    /// Standard deviation of the shift common to all strikes of one side, independent of the other side's.
     side_sd: f64,
     /// Relative standard deviation common to all steps.
     scale_sd: f64,
