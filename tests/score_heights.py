@@ -16,8 +16,9 @@ from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-from score_walks import HALF_WIDTH_SD, Clip, clips_of, shared_clips
+from score_walks import HALF_WIDTH_SD, Clip, clips_of, shared_clips, track_video
 
 
 @dataclass(frozen=True)
@@ -39,14 +40,14 @@ class Said:
 def track(clip: Clip, times: float) -> Said:
     """What memo says of the longest walk of a clip."""
     import memo
-    from memo.video import VideoReader
 
-    with VideoReader(clip.folder / "video.mp4") as reader:
-        frames = [(frame.luma.copy(), frame.time_s) for frame in reader]
-    lumas, times_s = zip(*frames, strict=True)
     camera = memo.Camera.from_toml(clip.folder / "camera.toml")
     given = clip.height_m * times if times else None
-    found = memo.track(lumas, times_s=times_s, camera=camera, height_m=given)
+    return said_of(clip, track_video(clip.folder / "video.mp4", given, camera))
+
+
+def said_of(clip: Clip, found: Any) -> Said:
+    """What a track says of its longest walk."""
     rows = found.columns["walk"].tolist() if found.walks else []
     longest = max(range(len(found.walks)), key=rows.count, default=None)
     walk = None if longest is None else found.walks[longest]

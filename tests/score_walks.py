@@ -417,7 +417,7 @@ def track_clip(clip: Clip) -> ClipScore:
     import memo
 
     camera = memo.Camera.from_toml(clip.folder / "camera.toml")
-    found = _track(clip.folder / "video.mp4", clip.height_m, camera)
+    found = track_video(clip.folder / "video.mp4", clip.height_m, camera)
     return score(
         clip.name,
         found.columns,
@@ -435,14 +435,17 @@ def track_demo(folder: Path) -> DemoScore:
     import memo
 
     camera = memo.Camera.from_toml(folder / "camera.toml")
-    found = _track(folder / "demo4.mp4", DEMO_HEIGHT_M, camera, DEMO_START, DEMO_STOP)
+    found = track_video(folder / "demo4.mp4", DEMO_HEIGHT_M, camera, DEMO_START, DEMO_STOP)
     columns = dict(found.columns)
     columns["frame"] = columns["frame"] + DEMO_START
     events = [event | {"frame": event["frame"] + DEMO_START} for event in found.events]
     return score_demo(columns, events, folder / "annotation")
 
 
-def _track(video: Path, height_m: float, camera: Any, start: int = 0, stop: int | None = None) -> Any:
+def track_video(
+    video: Path, height_m: float | None, camera: Any, start: int = 0, stop: int | None = None
+) -> Any:
+    """`memo.track` of the frames of a video."""
     import memo
     from memo.video import VideoReader
 
