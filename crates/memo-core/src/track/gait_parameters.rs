@@ -342,8 +342,7 @@ impl TrackedWalk {
             false => depth_sd_m / path.distance(eye),
         };
         let distance = relative.hypot(POSTURE_SD);
-        let view = (self.camera.rotation.transpose() * glam::DVec3::Z).truncate().normalize_or_zero();
-        let along_view_sq = path.direction().dot(view).powi(2);
+        let along_view_sq = path.direction().dot(self.view()).powi(2);
         if self.tilt.is_some() { distance.hypot(ASSUMED_FOCAL_SD * along_view_sq) } else { distance }
     }
 }

@@ -16,7 +16,7 @@ use super::start::{Direction, StartReport};
 use super::walk::{Step, Walk, WalkOptions};
 use crate::calibrate::TiltEstimate;
 use crate::estimate::kalman::{ConstantVelocity, FilterOptions, Noise, smooth};
-use crate::model::{Camera, PosedBody, Posture, SideJoints, Walker};
+use crate::model::{ASSUMED_FOCAL_SD, Camera, PosedBody, Posture, SideJoints, Walker};
 use glam::{DVec2, DVec3};
 use std::borrow::Cow;
 
@@ -207,6 +207,7 @@ impl TrackedWalk {
         let posed = fit.pose(k);
         let ahead = DVec2::from_angle(frame.heading_rad);
         let [along, across, height, phase] = self.with_scale(frame, frame.sd);
+        let by_focal = self.focal_sd_m(posed.torso_centre.truncate());
         let phase_at = frame.phase.rem_euclid(1.0);
         Row {
             frame: step.frame,
@@ -217,8 +218,8 @@ impl TrackedWalk {
             p_swapped: fit.p_swapped,
             speed_mps: speed(&fit.frames, self.steps(), k) + self.belt().speed_mps,
             sd: [
-                (ahead.x * along).hypot(ahead.y * across),
-                (ahead.y * along).hypot(ahead.x * across),
+                (ahead.x * along).hypot(ahead.y * across).hypot(by_focal.x),
+                (ahead.y * along).hypot(ahead.x * across).hypot(by_focal.y),
                 height,
                 phase,
             ],
@@ -236,11 +237,33 @@ impl TrackedWalk {
     }
 
     /// Standard deviations of the means over the frames that were fitted; `None` without a fit. Those of the place are of an
-    /// assumed height too.
+    /// assumed height and an assumed camera too.
     pub fn mean_sd(&self) -> Option<MeanSd> {
         let fit = self.fitted()?;
-        let MeanSd { angles, place } = fit.mean_sd;
-        Some(MeanSd { angles, place: self.with_scale(&fit.frames[fit.frames.len() / 2], place) })
+        let middle = &fit.frames[fit.frames.len() / 2];
+        let [along, across, height, phase] = self.with_scale(middle, fit.mean_sd.place);
+        let centres = fit.frames.iter().map(|frame| frame.torso_centre.truncate());
+        let by_focal = self.focal_sd_m(centres.sum::<DVec2>() / fit.frames.len() as f64);
+        let ahead = DVec2::from_angle(middle.heading_rad);
+        let place =
+            [along.hypot(by_focal.dot(ahead)), across.hypot(by_focal.dot(ahead.perp())), height, phase];
+        Some(MeanSd { angles: fit.mean_sd.angles, place })
+    }
+
+    /// Horizontal direction of the line of sight; zero if the camera looks straight down.
+    pub(super) fn view(&self) -> DVec2 {
+        (self.camera.rotation.transpose() * DVec3::Z).truncate().normalize_or_zero()
+    }
+
+    /// Standard deviation of a place by the focal length of an assumed camera, in the direction of sight, metres. The world
+    /// begins where the first person was seen; with the height known, what lies beyond is farther away by f / f0, and what lies
+    /// beside it is where it is seen.
+    fn focal_sd_m(&self, place: DVec2) -> DVec2 {
+        if self.tilt.is_none() {
+            return DVec2::ZERO;
+        }
+        let view = self.view();
+        ASSUMED_FOCAL_SD * place.dot(view) * view
     }
 
     /// Standard deviations near a fitted frame. An assumed height scales the walk about the camera's foot point.
@@ -279,6 +302,7 @@ impl TrackedWalk {
         };
         let heading = scene.path.direction();
         let (forward, across) = (heading.abs() * along_sd, heading.perp().abs() * across_sd);
+        let by_focal = self.focal_sd_m(posed.torso_centre.truncate());
         Row {
             frame: step.frame,
             time_s: step.time_s,
@@ -288,8 +312,8 @@ impl TrackedWalk {
             p_swapped,
             speed_mps: along.0.velocity + self.belt().speed_mps,
             sd: [
-                forward.x.hypot(across.x),
-                forward.y.hypot(across.y),
+                forward.x.hypot(across.x).hypot(by_focal.x),
+                forward.y.hypot(across.y).hypot(by_focal.y),
                 sd(height, COMMON_SD[1]).hypot(self.height.assumed_scale_sd() * posed.torso_centre.z),
                 sd(phase, if step.by_feet { COMMON_PHASE_SD } else { COMMON_SD[2] }),
             ],

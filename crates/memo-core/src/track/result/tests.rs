@@ -4,6 +4,7 @@ use super::super::start::tests::report;
 use super::super::walk::tests::step_in;
 use super::super::walk::{Beginning, Look, State};
 use super::*;
+use crate::calibrate::tilt_of_lines;
 use crate::estimate::kalman::FilterOptions;
 use crate::synth::Random;
 use crate::track::fit::{FitQuality, MeanSd};
@@ -302,6 +303,39 @@ fn an_assumed_height_widens_places_in_proportion_to_their_distance() {
         let expected = known.sd[2].hypot(scale_sd * assumed.torso_centre.z);
         assert!((assumed.sd[2] - expected).abs() < 1e-12, "{assumed:?}");
         assert_eq!(known.torso_centre, assumed.torso_centre);
+    }
+}
+
+/// Two ways to the same place: through the camera of a focal length that is 18 % longer, from the same picture of somebody of
+/// the same height, and by the stated standard deviations.
+#[test]
+fn an_assumed_camera_widens_places_by_their_depth_behind_the_first() {
+    let frames: Vec<_> = uneven_s(20).into_iter().map(|time_s| (time_s, Some(truth(time_s)))).collect();
+    for heading_rad in [0.0, 0.5, -1.1] {
+        let path = Path { heading_rad, ..ACROSS };
+        let mut walk = followed(path, &frames, WalkOptions::default());
+        let known = walk.rows();
+        walk.tilt = Some(tilt_of_lines(&[], [640, 480], 500.0));
+        let eye = walk.camera.position();
+        let view = (walk.camera.rotation.transpose() * DVec3::Z).truncate().normalize();
+        for (known, assumed) in known.iter().zip(walk.rows()) {
+            // Depth is in proportion to the focal length, and the world is at the origin, whose depth is too.
+            let depth_m = |place: DVec2| (place - eye.truncate()).dot(view);
+            let place = known.torso_centre.truncate();
+            let moved = (1.18 - 1.0) * (depth_m(place) - depth_m(DVec2::ZERO)) * view;
+            for axis in 0..2 {
+                let expected = known.sd[axis].hypot(moved[axis]);
+                assert!((assumed.sd[axis] - expected).abs() < 1e-9, "{heading_rad}: {assumed:?}");
+            }
+            assert_eq!(known.sd[2..], assumed.sd[2..]);
+        }
+        let walk = fitted(walk, 0.0);
+        let [along, across, ..] = walk.mean_sd().unwrap().place;
+        let mean = walk.rows().iter().map(|row| row.torso_centre.truncate()).sum::<DVec2>() / 20.0;
+        let moved = 0.18 * mean.dot(view);
+        let [other_along, other_across, ..] = TrackedWalk { tilt: None, ..walk }.mean_sd().unwrap().place;
+        let added_sq = along.powi(2) - other_along.powi(2) + across.powi(2) - other_across.powi(2);
+        assert!((added_sq - moved.powi(2)).abs() < 1e-9, "{heading_rad}: {added_sq} {moved}");
     }
 }
 
