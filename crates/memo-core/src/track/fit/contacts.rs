@@ -24,8 +24,8 @@ pub struct Contact {
 pub type Feet = [[DVec3; 2]; 2];
 
 /// The shares of the walking speed that separate stance from swing, of the heel at contact and of the toes at toe-off.
-/// Of nine drawn people the mean times differ by 10 ms (standard deviation) with 0.28 to 0.5 of the heel, and by 16 with 0.2; but the
-/// sides of one slow walker by 29 ms from 0.4 on.
+/// Over 80 drawn walks of six people, the mean times of people are 8 to 10 ms from their median (root mean square) with 0.28 to 0.5
+/// of the heel, and 12 with 0.2; the sides of a person differ by 11 ms with 0.28, 9 with 0.4, 7 with 0.5 and 19 with 0.2.
 const HEEL_SHARE: f64 = 0.4;
 const TOE_SHARE: f64 = 0.4;
 /// The initial contact is this much later, seconds: the median over nine drawn people, of seven of whom the fitted heel slows 26 to

@@ -57,8 +57,8 @@ fn intervals_of_fitted_steps_hold_the_truth_as_often_as_they_say() {
         let truth_s = [0.55 + uneven_s, 0.55 - uneven_s];
         let (mut time_s, mut strikes) = (0.0, Vec::new());
         for index in 0..7 {
-            let side = if index % 2 == 0 { Side::Right } else { Side::Left };
             let right = index % 2 == 0;
+            let side = if right { Side::Right } else { Side::Left };
             time_s += truth_s[usize::from(!right)] * (1.0 + normal(NATURAL_SHARE));
             let found_s = time_s + normal(CONTACT_SD_S) + if right { late_right } else { 0.0 };
             strikes.push(Contact { kind: EventKind::HeelStrike, side, time_s: found_s });
@@ -86,13 +86,9 @@ fn intervals_of_fitted_steps_hold_the_truth_as_often_as_they_say() {
         }
     }
     for k in 0..3 {
-        let needed = Z * (error_sum_sq[k] / 2000.0).sqrt();
+        let width = half_sum[k] / 2000.0 / (Z * (error_sum_sq[k] / 2000.0).sqrt());
         assert!((1860..=1970).contains(&held[k]), "{k}: {}", held[k]);
-        assert!(
-            (0.92..1.2).contains(&(half_sum[k] / 2000.0 / needed)),
-            "{k}: {}",
-            half_sum[k] / 2000.0 / needed
-        );
+        assert!((0.92..1.2).contains(&width), "{k}: {width}");
     }
 }
 

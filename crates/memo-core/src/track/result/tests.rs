@@ -306,8 +306,7 @@ fn an_assumed_height_widens_places_in_proportion_to_their_distance() {
     }
 }
 
-/// Two ways to the same place: through the camera of a focal length that is 18 % longer, from the same picture of somebody of
-/// the same height, and by the stated standard deviations.
+/// A focal length that is 18 % longer puts everybody 18 % farther from the camera, and the origin too.
 #[test]
 fn an_assumed_camera_widens_places_by_their_depth_behind_the_first() {
     let frames: Vec<_> = uneven_s(20).into_iter().map(|time_s| (time_s, Some(truth(time_s)))).collect();
@@ -319,7 +318,6 @@ fn an_assumed_camera_widens_places_by_their_depth_behind_the_first() {
         let eye = walk.camera.position();
         let view = (walk.camera.rotation.transpose() * DVec3::Z).truncate().normalize();
         for (known, assumed) in known.iter().zip(walk.rows()) {
-            // Depth is in proportion to the focal length, and the world is at the origin, whose depth is too.
             let depth_m = |place: DVec2| (place - eye.truncate()).dot(view);
             let place = known.torso_centre.truncate();
             let moved = (1.18 - 1.0) * (depth_m(place) - depth_m(DVec2::ZERO)) * view;
