@@ -20,6 +20,7 @@ use super::standing::Standing;
 use super::walk::{Beginning, FrameEdges, State, Step, Walk};
 use crate::estimate::line::line_through;
 use crate::model::{Camera, Others};
+use std::collections::HashMap;
 
 /// So much of what a frame's place and phase are off is expected in the frame before.
 const DRIFT: f64 = 0.5;
@@ -78,18 +79,26 @@ impl<'a> Beside<'a> {
         (!steps.is_empty()).then(|| Self { walk, camera, lead: Lead::of(steps, options) })
     }
 
+    /// Where the person is in a frame, or was before the walk started; `None` after it.
+    fn place(&self, frame: usize, time_s: f64) -> Option<Hypothesis> {
+        let steps = self.walk.steps();
+        let after = steps.partition_point(|step| step.frame < frame);
+        match steps.get(after)? {
+            step if step.frame == frame => Some(step.state.hypothesis()),
+            _ if after == 0 => Some(self.lead.at(time_s)),
+            _ => None,
+        }
+    }
+
+    fn scene(&self, place: &Hypothesis) -> Scene<'_> {
+        Scene::new(&self.walk.walker, self.camera, &self.walk.route.at(place.along_m))
+    }
+
     /// The person in a frame; `None` after the walk, or if nothing of the person is before the camera.
     fn in_frame(&self, seen: &Seen) -> Option<Expected> {
-        let steps = self.walk.steps();
         let FrameEdges { frame, time_s, window, .. } = seen.edges;
-        let after = steps.partition_point(|step| step.frame < frame);
-        let place = match steps.get(after)? {
-            step if step.frame == frame => step.state.hypothesis(),
-            _ if after == 0 => self.lead.at(time_s),
-            _ => return None,
-        };
-        let path = self.walk.route.at(place.along_m);
-        let scene = Scene::new(&self.walk.walker, self.camera, &path);
+        let place = self.place(frame, time_s)?;
+        let scene = self.scene(&place);
         let height_px = body_box(self.camera, &scene.pose(&place).cylinders)?.height();
         let other = Hypothesis { phase: place.phase + 0.5, ..place };
         Some(expected(&scene, [place, other], window, height_px))
@@ -160,6 +169,30 @@ impl Active {
         self.pieces.splice(0..0, pieces.collect::<Vec<_>>());
     }
 
+    /// Adds the people behind this one to what the frames of the walk show: before them, an outline borders on no empty scene,
+    /// and the crown of the changes may be theirs.
+    pub(super) fn before_others(&mut self, beside: &[Beside<'_>]) {
+        let steps: HashMap<usize, &Step> = self.walk.steps().iter().map(|step| (step.frame, step)).collect();
+        for piece in &mut self.pieces {
+            let Some(step) = steps.get(&piece.frame) else { continue };
+            let place = step.state.hypothesis();
+            let path = self.walk.route.at(place.along_m);
+            let body = Scene::new(&self.walk.walker, &self.camera, &path).pose(&place);
+            let distance_m = body.torso_centre.distance(self.camera.position());
+            for other in beside {
+                let Some(place) = other.place(piece.frame, step.time_s) else { continue };
+                let body = other.scene(&place).pose(&place);
+                let is_behind = body.torso_centre.distance(other.camera.position()) > distance_m;
+                let is_near = body_box(other.camera, &body.cylinders)
+                    .is_some_and(|sides| sides.overlap(&piece.kept.sides(0.0)) > 0.0);
+                if is_behind && is_near {
+                    piece.others.extend(body.cylinders);
+                    piece.crown_px = None;
+                }
+            }
+        }
+    }
+
     /// What a region showed, with the people who stand in front of this one there.
     fn behind(&self, beside: &[Beside<'_>], lead: &Lead, seen: &Seen) -> Seen {
         let path = self.walk.route.at(lead.at(seen.edges.time_s).along_m);
@@ -208,6 +241,7 @@ mod tests {
     use super::super::active::tests::{BEGINNING, PATH, active, frames_on, options};
     use super::super::search::Path;
     use super::*;
+    use crate::image::Image;
     use glam::DVec2;
     use std::sync::Arc;
 
@@ -311,6 +345,46 @@ mod tests {
             let other = Beside::new(&walk, &camera, &options()).unwrap();
             assert_eq!(first_frame_beside(begun(), &[other]), first, "{nearer_m} m nearer");
         }
+    }
+
+    /// A person behind is known to the frames of both walks and to those before that person's start, but not to others; one in front
+    /// or far to the side to none.
+    #[test]
+    fn the_fit_is_told_who_is_behind() {
+        let begun_at = |frame: usize| {
+            let mut active = begun();
+            let steps = &mut active.walk.twins[0].steps;
+            steps.retain(|step| step.frame >= frame);
+            active
+        };
+        let behind = |away_m: f64, ahead_m: f64, from: usize, to: usize| {
+            let mut other = begun_at(from);
+            other.walk.route = Path { origin: PATH.origin + DVec2::new(ahead_m, away_m), ..PATH }.into();
+            other.walk.twins[0].steps.retain(|step| step.frame < to);
+            let other = Beside::new(&other.walk, &other.camera, &options()).map(|beside| {
+                let mut active = begun();
+                let image = Image::filled(640, 480, 0u8);
+                active.pieces = (FIRST..60)
+                    .map(|frame| Piece {
+                        crown_px: Some(7.0),
+                        ..Piece::new(frame, &image, active.kept[0].1.window, Vec::new())
+                    })
+                    .collect();
+                active.before_others(&[beside]);
+                active
+            });
+            let told = |piece: &Piece| (!piece.others.is_empty(), piece.crown_px.is_none());
+            other.unwrap().pieces.iter().map(told).collect::<Vec<_>>()
+        };
+        assert_eq!(behind(0.5, 0.1, FIRST, 60), [(true, true); 40]);
+        assert_eq!(behind(0.5, 0.1, FIRST + 20, 60), [(true, true); 40], "before the other one starts");
+        let until = behind(0.5, 0.1, FIRST, FIRST + 30);
+        assert_eq!(
+            (until[..30].to_vec(), until[30..].to_vec()),
+            (vec![(true, true); 30], vec![(false, false); 10])
+        );
+        assert_eq!(behind(-0.5, 0.1, FIRST, 60), [(false, false); 40], "in front");
+        assert_eq!(behind(0.5, 40.0, FIRST, 60), [(false, false); 40], "elsewhere");
     }
 
     #[test]

@@ -116,6 +116,15 @@ impl Route {
         along_m
     }
 
+    /// The route that is farther from a point by a factor, and as much longer.
+    #[must_use]
+    pub fn scaled(&self, about: DVec2, factor: f64) -> Self {
+        let moved = |place: DVec2| about + factor * (place - about);
+        let knot = |knot: &Knot| Knot { along_m: factor * knot.along_m, place: moved(knot.place), ..*knot };
+        let start = Path { origin: moved(self.start.origin), ..self.start };
+        Self { start, knots: self.knots.iter().map(knot).collect() }
+    }
+
     /// The route turned about a point, and then moved to its left; lengths along it begin at the point.
     #[must_use]
     pub fn moved(&self, about: DVec2, about_along_m: f64, turn_rad: f64, left_m: f64) -> Self {
@@ -181,6 +190,21 @@ mod tests {
         let point = DVec2::new(5.0, 1.0);
         assert_eq!(route.along(point, 77.0), path.along(point));
         assert_eq!(turn(&route, -3.0, 8.0), 0.0);
+    }
+
+    /// Each place moves away from the point on the ray through it, and the headings stay.
+    #[test]
+    fn a_scaled_route_is_seen_from_the_point_as_before() {
+        let straight = Route::from(Path { origin: DVec2::new(0.3, -2.0), heading_rad: 4.0 });
+        let about = DVec2::new(1.0, -7.0);
+        for route in [straight, circle()] {
+            let far = route.scaled(about, 1.3);
+            for along_m in [-1.0, 2.0, 3.7, 9.1, 17.5, 40.0] {
+                let place = about + 1.3 * (route.place(along_m) - about);
+                assert!(far.place(1.3 * along_m).distance(place) < 1e-9, "{along_m}");
+                assert!((far.at(1.3 * along_m).heading_rad - route.at(along_m).heading_rad).abs() < 1e-12);
+            }
+        }
     }
 
     #[test]

@@ -15,6 +15,8 @@
 //! 6. The steps after the first ones are made again with left and right exchanged, of a person whom others hide in part the
 //!    first ones too, and the evidence decides (`sides`).
 //! 7. Standard deviations follow from the normal equations.
+//! 8. A fit that is not a good one is made again at other distances from the camera, where the likeliest is clearly likelier
+//!    (`of_walk`).
 //!
 //! The normal equations (`normal`) have the form of an arrow ([`estimate::arrow`](crate::estimate::arrow)), so the time
 //! is linear in the number of frames.

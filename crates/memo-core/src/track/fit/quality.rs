@@ -27,6 +27,9 @@ pub struct FitQuality {
     /// Robust cost of the distances of all edges, which the fit makes least: of two fits to the same frames, the one that costs
     /// less is nearer to the edges.
     pub cost: f64,
+    /// Cost of the edges of a whole outline in every frame, and of what body, height and ground are off their means over
+    /// people: of two fits to the same frames at other distances from the camera, the one that costs less is likelier.
+    pub total_cost: f64,
     /// The outline of each part, in the order of [`Part::ALL`]; `None` of a part that is nowhere on the outline.
     pub parts: [Option<PartQuality>; PART_COUNT],
 }
@@ -136,6 +139,7 @@ mod tests {
         sole_m: Some(0.01),
         crown_off: Some(0.004),
         cost: 3000.0,
+        total_cost: 150.0,
         parts: [Some(PartQuality { share: 1.0 / 14.0, missed: 0.01, residual_px: Some(0.7) }); PART_COUNT],
     };
 

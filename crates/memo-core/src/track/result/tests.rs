@@ -377,6 +377,7 @@ pub fn fitted(walk: TrackedWalk, missed: f64) -> TrackedWalk {
             worst_length_sd: 1.0,
             sole_m: None,
             crown_off: None,
+            total_cost: 150.0,
             cost: 3000.0,
             parts: [None; 14],
         },

@@ -89,6 +89,7 @@ impl Tracker {
         if has_no_legs(&active.of_its_own) {
             return self.withdraw(active.person, walk_boxes, Reason::Beside);
         }
+        active.before_others(&self.beside());
         let p_swapped = active.p_swapped(&self.options);
         let fit = active.fit(&self.backdrop, &self.options, Some(p_swapped));
         if let Some(reason) = self.no_walk(&active, fit.as_ref()) {
@@ -123,12 +124,7 @@ impl Tracker {
         active.settle(&self.backdrop, &self.options);
         // On a smoothed route, the feet would walk on.
         let standing = active.standing();
-        let fading = self.fading.iter().map(|(_, other)| other);
-        let followed = self.people.iter().chain(fading).map(|other| (&other.walk, &other.camera));
-        let ended = self.finished.iter().chain(&self.returned).map(|other| (&other.walk, &other.camera));
-        let beside =
-            followed.chain(ended).filter_map(|(walk, camera)| Beside::new(walk, camera, &self.options));
-        active.begin_before(&beside.collect::<Vec<_>>(), &self.options);
+        active.begin_before(&self.beside(), &self.options);
         active.begin_earlier(&self.options);
         active.turned(&self.options);
         active.pace_all();
@@ -136,6 +132,14 @@ impl Tracker {
         let standing = standing.or_else(|| active.standing());
         active.trim();
         standing
+    }
+
+    /// Everybody else who is or was followed of late.
+    fn beside(&self) -> Vec<Beside<'_>> {
+        let fading = self.fading.iter().map(|(_, other)| other);
+        let followed = self.people.iter().chain(fading).map(|other| (&other.walk, &other.camera));
+        let ended = self.finished.iter().chain(&self.returned).map(|other| (&other.walk, &other.camera));
+        followed.chain(ended).filter_map(|(walk, camera)| Beside::new(walk, camera, &self.options)).collect()
     }
 
     /// Why something that was followed is no walk. What was left over from somebody else can look like a walker, but then

@@ -48,18 +48,18 @@ fn scene(frames: usize) -> SceneOptions {
 }
 
 /// A walker drawn by the model, and the frames in which the fit finds it at the true places and phases.
-struct Drawn {
-    camera: Camera,
-    walker: Walker,
-    route: Route,
-    frames: Vec<FitFrame>,
+pub struct Drawn {
+    pub camera: Camera,
+    pub walker: Walker,
+    pub route: Route,
+    pub frames: Vec<FitFrame>,
 }
 
 fn drawn() -> Drawn {
     drawn_for(24)
 }
 
-fn drawn_for(frames: usize) -> Drawn {
+pub fn drawn_for(frames: usize) -> Drawn {
     let scene = SynthScene::new(scene(frames)).unwrap();
     let background = scene.frame(0);
     let frame = |truth: Truth| {
@@ -87,7 +87,7 @@ fn drawn_for(frames: usize) -> Drawn {
 }
 
 /// Frames enough for a step of either leg.
-const TWO_STEPS: usize = 44;
+pub const TWO_STEPS: usize = 44;
 
 /// The frames of somebody with the mean joint curves of people, but for a knee, of the side 0 or 1, whose flexion is smaller
 /// by a share.
