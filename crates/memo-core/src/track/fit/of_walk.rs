@@ -36,7 +36,7 @@ const SEAM_S: f64 = 1.0;
 const STRAIGHT: f64 = 1.02;
 
 /// Other distances from the camera at which a fit is tried, as factors of the tracker's.
-const DISTANCES: [f64; 4] = [0.85, 0.92, 1.08, 1.16];
+const DISTANCES: [f64; 2] = [0.85, 1.16];
 /// A fit at another distance is taken if it costs less than this factor of the one at the tracker's, which fits in part or
 /// poorly. Of people whom the tracker has 0.5 m and more too far away, it costs 0.62 to 0.80 of it, and 0.94 of one who fits poorly.
 /// Of those who are at most 13 cm off, it costs 0.89 to 0.99; most of them come out nearer to the truth, but a filmed woman, with
@@ -157,14 +157,16 @@ impl Tracked<'_> {
         // 1. Where a few of the frames are likeliest.
         let glance = |factor: f64| {
             let route = moved(frames, factor);
-            Some((factor, self.problem(&route, frames, options).glance()?))
+            let (gait, total_cost) = self.problem(&route, frames, options).glance(0.0).ok()?;
+            Some((factor, gait, total_cost))
         };
         let glances: Vec<_> = [1.0].into_iter().chain(DISTANCES).filter_map(glance).collect();
-        let likeliest = glances.into_iter().min_by(|a, b| a.1.total_cmp(&b.1));
-        let Some((factor, _)) = likeliest.filter(|&(factor, _)| factor != 1.0) else { return here };
+        let likeliest = glances.into_iter().min_by(|a, b| a.2.total_cmp(&b.2));
+        let Some((factor, gait, _)) = likeliest.filter(|&(factor, ..)| factor != 1.0) else { return here };
         // 2. All frames there. What the tracker said of the sides, contours said that lay elsewhere.
         let route = moved(frames, factor);
-        let there = self.fit_over_ground(&route, frames, options, Some(0.5));
+        let problem = self.problem(&route, frames, options);
+        let there = problem.fit(gait, Some(0.5));
         let is_likelier = match (&here, &there) {
             (Ok(here), Ok(there)) => {
                 let is_poor = here.quality.verdict() == FitVerdict::Poorly;
@@ -174,7 +176,7 @@ impl Tracked<'_> {
             (Err(_), Ok(there)) => there.quality.verdict() != FitVerdict::Poorly,
             (_, Err(_)) => false,
         };
-        if is_likelier { there } else { here }
+        if is_likelier { there.map(|fit| self.with_height_of_its_own(fit, problem, gait)) } else { here }
     }
 
     /// The same with the height that the picture shows if the given one is far from it: the fit near the given height

@@ -337,6 +337,11 @@ impl<'a> Problem<'a> {
 
     /// The gait from which a few of the frames come nearest to their edges once the person's curves are fitted.
     pub fn start_gait(&self, phase: f64) -> Result<StartGait, FitError> {
+        self.glance(phase).map(|(gait, _)| gait)
+    }
+
+    /// The same with the [total cost](FitQuality::total_cost) of these frames with their curves.
+    pub fn glance(&self, phase: f64) -> Result<(StartGait, f64), FitError> {
         if self.frames.len() < LEAST_FRAMES {
             return Err(FitError::TooFewFrames { got: self.frames.len() });
         }
@@ -353,10 +358,11 @@ impl<'a> Problem<'a> {
         let costs: Vec<_> = started
             .into_par_iter()
             .filter(|(cost, ..)| *cost <= MOST_START_COST * least)
-            .filter_map(|(_, unknowns, gait)| Some((few.curves_cost(unknowns)? * gait.handicap(), gait)))
+            .filter_map(|(_, unknowns, gait)| Some((gait, few.curves_costs(unknowns)?)))
+            .map(|(gait, [cost, total_cost])| (cost * gait.handicap(), (gait, total_cost)))
             .collect();
         let best = costs.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
-        best.map(|(_, gait)| gait).ok_or(FitError::Undetermined)
+        best.map(|(_, best)| best).ok_or(FitError::Undetermined)
     }
 
     /// The same with every second, third ... frame, so that there are at most [`FEW_FRAMES`], but at least one in [`FEW_S`].
@@ -386,22 +392,14 @@ impl<'a> Problem<'a> {
         Some((cost, unknowns))
     }
 
-    /// The cost after the steps with the person's curves.
-    fn curves_cost(&self, mut unknowns: Unknowns) -> Option<f64> {
+    /// The cost after the steps with the person's curves, and the total one.
+    fn curves_costs(&self, mut unknowns: Unknowns) -> Option<[f64; 2]> {
         let height_px = self.height_px(&unknowns)?;
-        let mut cost = f64::INFINITY;
+        let mut seen = Seen::default();
         for n in STEPS[0]..FRAMES_STEP {
-            cost = self.cost(&self.step(&mut unknowns, &self.width(n, height_px), Stage::Curves)?.0);
+            seen = self.step(&mut unknowns, &self.width(n, height_px), Stage::Curves)?.0;
         }
-        Some(cost)
-    }
-
-    /// The [total cost](FitQuality::total_cost) of a fit to a few of the frames.
-    pub fn glance(&self) -> Option<f64> {
-        let few = self.of_few_frames();
-        let (start, _) = few.best_start(0.0).ok()?;
-        let fitted = few.finished(start)?;
-        Some(few.total_cost(&fitted.unknowns, &fitted.seen))
+        Some([self.cost(&seen), self.total_cost(&unknowns, &seen)])
     }
 
     /// Cost of the edges of a whole outline in every frame, and minus twice the logarithm of the prior probability of body,
