@@ -35,8 +35,10 @@ const SEAM_S: f64 = 1.0;
 /// degrees, costs 0.93, with lengths of the body nearer to the average.
 const STRAIGHT: f64 = 1.02;
 
-/// Other distances from the camera at which a fit is tried, as factors of the tracker's.
+/// Other distances from the camera at which a fit is tried, as factors of the tracker's: of somebody whom the first one fits in
+/// part, and also those of somebody whom it fits poorly or not at all.
 const DISTANCES: [f64; 2] = [0.85, 1.16];
+const DISTANCES_OF_POORLY: [f64; 4] = [0.85, 0.92, 1.08, 1.16];
 /// A fit at another distance is taken if it costs less than this factor of the one at the tracker's, which fits in part or
 /// poorly. Of people whom the tracker has 0.5 m and more too far away, it costs 0.62 to 0.80 of it, and 0.94 of one who fits poorly.
 /// Of those who are at most 13 cm off, it costs 0.89 to 0.99; most of them come out nearer to the truth, but a filmed woman, with
@@ -138,13 +140,16 @@ impl Tracked<'_> {
         tracked_m: &[f64],
         options: &FitOptions,
     ) -> Result<WalkFit, FitError> {
-        let may_be_elsewhere = match &here {
-            Ok(fit) => fit.quality.verdict() != FitVerdict::Well,
-            Err(error) => matches!(error, FitError::Misfit { .. }),
+        let verdict = match &here {
+            Ok(fit) => fit.quality.verdict(),
+            Err(FitError::Misfit { .. }) => FitVerdict::Poorly,
+            Err(_) => return here,
         };
-        if !may_be_elsewhere {
-            return here;
-        }
+        let (distances, most_cost) = match verdict {
+            FitVerdict::Well => return here,
+            FitVerdict::InPart => (&DISTANCES[..], LIKELIER),
+            FitVerdict::Poorly => (&DISTANCES_OF_POORLY[..], LIKELIER_THAN_POORLY),
+        };
         let eye = self.camera.position().truncate();
         let moved = |frames: &mut [FitFrame], factor: f64| {
             for (frame, along_m) in frames.iter_mut().zip(tracked_m) {
@@ -155,12 +160,12 @@ impl Tracked<'_> {
             fitted_route(self.camera, self.average, &route, ends_m, frames, options)
         };
         // 1. Where a few of the frames are likeliest.
-        let glance = |factor: f64| {
+        let glance = |&factor: &f64| {
             let route = moved(frames, factor);
             let (gait, total_cost) = self.problem(&route, frames, options).glance(0.0).ok()?;
             Some((factor, gait, total_cost))
         };
-        let glances: Vec<_> = [1.0].into_iter().chain(DISTANCES).filter_map(glance).collect();
+        let glances: Vec<_> = [1.0].iter().chain(distances).filter_map(glance).collect();
         let likeliest = glances.into_iter().min_by(|a, b| a.2.total_cmp(&b.2));
         let Some((factor, gait, _)) = likeliest.filter(|&(factor, ..)| factor != 1.0) else { return here };
         // 2. All frames there. What the tracker said of the sides, contours said that lay elsewhere.
@@ -168,11 +173,7 @@ impl Tracked<'_> {
         let problem = self.problem(&route, frames, options);
         let there = problem.fit(gait, Some(0.5));
         let is_likelier = match (&here, &there) {
-            (Ok(here), Ok(there)) => {
-                let is_poor = here.quality.verdict() == FitVerdict::Poorly;
-                let factor = if is_poor { LIKELIER_THAN_POORLY } else { LIKELIER };
-                there.quality.total_cost < factor * here.quality.total_cost
-            }
+            (Ok(here), Ok(there)) => there.quality.total_cost < most_cost * here.quality.total_cost,
             (Err(_), Ok(there)) => there.quality.verdict() != FitVerdict::Poorly,
             (_, Err(_)) => false,
         };
