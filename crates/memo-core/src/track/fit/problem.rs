@@ -774,7 +774,7 @@ const SOLE: f64 = 0.1;
 
 /// What one whole outline costs in the [total cost](FitQuality::total_cost) if none of its edges is near the line. A sample of it
 /// has a tenth of the weight that it has in a step, because what the model lacks is common to neighbouring samples and frames:
-/// with the full weight, three of nine drawn walks in clothes that hardly differ from the background are moved 13 to 47 cm too
+/// with the full weight, four of 14 drawn walks in clothes that hardly differ from the background are moved 14 to 47 cm too
 /// far, with legs that are too short.
 const OUTLINE_COST: f64 = 7.0;
 
