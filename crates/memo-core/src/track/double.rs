@@ -8,17 +8,22 @@
 //! 2. A pixel shows somebody if it differs from the empty scene by half of what the pixels on both differ by (median).
 //! 3. The own share of a body is the share of it that is not on the other and shows somebody, divided by the share of what is on both
 //!    that does. If one of them has hardly any, both are of one person.
-//! 4. Of the two, the one is withdrawn that is mostly where nobody is, or fits poorly, or is shorter.
+//! 4. Of the two, the one is second that is mostly where nobody is, or fits poorly, or is shorter. In the frames of both it is
+//!    withdrawn. It stays in frames that the other one does not have: there, it goes on with the person.
 
 use super::crowd::{body_box, paint_body};
-use super::decisions::{OWN_BODY, SAME_BODY, SHOWN_BODY};
+use super::decisions::{OWN_BODY, SAME_BODY, SAME_WAY, SHOWN_BODY};
 use super::fit::FitVerdict;
 use super::fit::edge_search::View;
 use super::result::TrackedWalk;
 use super::walk::Step;
 use crate::image::Mask;
 use crate::model::PosedBody;
+use glam::DVec2;
 use std::collections::BTreeMap;
+
+/// Fewer frames in which one walk goes on as the other one does tell nothing: somebody may pass the other.
+const LEAST_COMMON: usize = 7;
 
 /// A walk and the bodies in its frames.
 struct Bodies<'a> {
@@ -40,9 +45,9 @@ impl<'a> Bodies<'a> {
 
 impl TrackedWalk {
     /// Which of two walks of one person is the second model of that person: `Some(true)` for this one, `Some(false)` for the
-    /// other one, `None` for walks of two people, or if less than half of the shorter walk's frames are common to both. The longer
-    /// walk stays, unless it alone is where nobody is or fits poorly and half of its frames are common to both. The `views` are
-    /// those of this walk, with their frames.
+    /// other one, `None` for walks of two people, or if less than half of the shorter walk's frames are common to both and
+    /// neither goes on as the other one does. The longer walk is the first, unless it alone is where nobody is or fits
+    /// poorly and half of its frames are common to both. The `views` are those of this walk, with their frames.
     pub(super) fn is_second_model(&self, other: &Self, views: &[(usize, View)]) -> Option<bool> {
         if !are_at_a_time(self.steps(), other.steps()) {
             return None;
@@ -52,7 +57,7 @@ impl TrackedWalk {
             own.of_frames.keys().copied().filter(|frame| others.of_frames.contains_key(frame)).collect();
         let [own_frames, other_frames] = [own, others].map(|bodies| bodies.of_frames.len());
         let is_common = |frames: usize| 2 * common.len() >= frames;
-        if !is_common(own_frames.min(other_frames)) {
+        if !is_common(own_frames.min(other_frames)) && !is_in_turn([self, other], &common) {
             return None;
         }
         let shares = shares(both, views);
@@ -72,6 +77,50 @@ impl TrackedWalk {
             _ => own_frames <= other_frames,
         })
     }
+
+    /// First and last frame.
+    pub(super) fn first_and_last(&self) -> Option<[usize; 2]> {
+        Some([self.steps().first()?.frame, self.steps().last()?.frame])
+    }
+
+    /// The longer part of a walk before or after some frames; `None` if it has fewer than `least` frames.
+    pub(super) fn outside(mut self, [first, last]: [usize; 2], least: usize) -> Option<Self> {
+        let steps = self.steps();
+        let (before, after) =
+            (steps.partition_point(|s| s.frame < first), steps.partition_point(|s| s.frame <= last));
+        let kept = if before >= steps.len() - after { 0..before } else { after..steps.len() };
+        if kept.len() < least {
+            return None;
+        }
+        let times_s = steps[kept.start].time_s..=steps[kept.end - 1].time_s;
+        self.walk.keep(kept.clone());
+        if !self.camera_turns.is_empty() {
+            self.camera_turns = self.camera_turns[kept.clone()].to_vec();
+        }
+        if !self.crowns_px.is_empty() {
+            self.crowns_px = self.crowns_px[kept.clone()].to_vec();
+        }
+        if let Some(Ok(fit)) = &mut self.fit {
+            fit.frames = fit.frames[kept].to_vec();
+            fit.contacts.retain(|contact| times_s.contains(&contact.time_s));
+        }
+        Some(self)
+    }
+}
+
+/// True if one of two walks begins and ends before the other one, which goes the same way.
+fn is_in_turn([own, others]: [&TrackedWalk; 2], common: &[usize]) -> bool {
+    let Some(([first, last], [other_first, other_last])) = own.first_and_last().zip(others.first_and_last())
+    else {
+        return false;
+    };
+    let is_earlier = first < other_first && last < other_last || first > other_first && last > other_last;
+    let way = |walk: &TrackedWalk| {
+        let row = walk.rows().into_iter().find(|row| Some(&row.frame) == common.last())?;
+        Some(row.speed_mps.signum() * DVec2::from_angle(row.heading_rad))
+    };
+    let is_same_way = || way(own).zip(way(others)).is_some_and(|(a, b)| a.dot(b) >= SAME_WAY);
+    is_earlier && common.len() >= LEAST_COMMON && is_same_way()
 }
 
 /// True for walks of which one begins before the other ends.

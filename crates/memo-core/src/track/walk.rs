@@ -355,7 +355,7 @@ impl Walk {
     pub(crate) fn keep(&mut self, range: std::ops::Range<usize>) {
         for twin in &mut self.twins {
             twin.steps.truncate(range.end);
-            twin.steps.drain(..range.start);
+            twin.steps.drain(..range.start.min(twin.steps.len()));
         }
     }
 

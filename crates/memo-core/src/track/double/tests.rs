@@ -96,3 +96,34 @@ fn without_an_empty_scene_boxes_tell_how_far_models_lie_on_each_other() {
     assert_eq!(beside(-0.45, 100, 12).is_second_model(&long, &[]), None, "later");
     assert_eq!(beside(-0.45, 24, 16).is_second_model(&long, &[]), None, "common to both are six frames");
 }
+
+/// The first goes on as the second, which is longer: in the frames of both the first is dropped.
+#[test]
+fn of_two_models_in_turn_each_keeps_its_own_frames() {
+    let (early, late) = (beside(-0.5, 0, 30), beside(-0.48, 20, 40));
+    let [first, last] = late.first_and_last().unwrap();
+    let early_end = early.first_and_last().unwrap()[1];
+    assert!(first < early_end && early_end < last);
+    let long = beside(-0.5, 0, 60);
+    let seen = views(&early, &[&long], 80);
+    assert_eq!(early.is_second_model(&late, &seen), Some(true));
+    assert_eq!(late.is_second_model(&early, &views(&late, &[&long], 80)), Some(false));
+    // Two people who are in the picture together, and one who goes the other way.
+    let both = views(&early, &[&early, &beside(0.2, 20, 40)], 80);
+    assert_eq!(early.is_second_model(&beside(0.2, 20, 40), &both), None);
+    let mut back = fitted(late.clone(), 0.01);
+    let fit = back.fit.as_mut().unwrap().as_mut().unwrap();
+    fit.frames.iter_mut().for_each(|frame| frame.heading_rad += std::f64::consts::PI);
+    assert_eq!(early.is_second_model(&back, &seen), None);
+
+    let steps = early.steps().iter().filter(|step| step.frame < first).count();
+    let mut whole = fitted(early.clone(), 0.01);
+    whole.camera_turns = vec![glam::DVec3::Z; 30];
+    whole.crowns_px = vec![Some(7.0); 30];
+    let rest = whole.clone().outside([first, last], steps).unwrap();
+    assert_eq!(rest.rows(), whole.rows()[..steps]);
+    assert_eq!((rest.camera_turns.len(), rest.crowns_px.len()), (steps, steps));
+    assert!(whole.clone().outside([first, last], steps + 1).is_none());
+    let [_, before] = rest.first_and_last().unwrap();
+    assert_eq!(whole.clone().outside([0, before], 1).unwrap().rows(), whole.rows()[steps..]);
+}

@@ -4,6 +4,7 @@ use super::super::active::Active;
 use super::super::before::Beside;
 use super::super::double::are_at_a_time;
 use super::super::evidence::Evidence;
+use super::super::fit::edge_search::View;
 use super::super::fit::views::Backdrop;
 use super::super::fit::{FitError, WalkFit};
 use super::super::left_out::Reason;
@@ -74,7 +75,8 @@ impl Tracker {
 
     /// 1. The route and its frames, from before and after each of them.
     /// 2. The person, fitted to all of them.
-    /// 3. What is no walk, or a second model of somebody else, or has no legs of its own, is withdrawn.
+    /// 3. What is no walk, or has no legs of its own, is withdrawn.
+    /// 4. Of two models of one person, one stays in the frames of both.
     pub(super) fn end_walk(&mut self, active: Active) {
         let was_settled = active.settled;
         let mut active = if was_settled { active } else { self.begun_otherwise(active) };
@@ -102,21 +104,59 @@ impl Tracker {
             false => Vec::new(),
         };
         let walk = self.tracked(active, fit);
-        // Two models can come to lie on one person, the fitted ones too.
-        let second = |other: &TrackedWalk| walk.is_second_model(other, &views);
-        let seconds: Vec<Option<bool>> = self.finished.iter().map(second).collect();
-        if seconds.contains(&Some(true)) || self.returned.iter().any(|other| second(other) == Some(true)) {
-            return self.withdraw(walk.person, walk_boxes, Reason::Beside);
-        }
-        if let Some(k) = seconds.iter().position(|second| *second == Some(false)) {
-            let double = self.finished.remove(k);
-            self.withdraw(double.person, None, Reason::Beside);
-        }
+        let end = walk.first_and_last().map(|[_, last]| last);
+        let walk = match self.without_others(walk, &views) {
+            Ok(walk) => walk,
+            Err(person) => return self.withdraw(person, walk_boxes, Reason::Beside),
+        };
         walk_boxes.into_iter().for_each(|walk_boxes| self.unfollowed.followed(walk_boxes));
-        if let Some(sign) = sign {
+        if let Some(sign) = sign.filter(|_| walk.first_and_last().map(|[_, last]| last) == end) {
             self.identities.end(walk.person, sign);
         }
         self.finished.push(walk);
+    }
+
+    /// What remains of a walk beside other models of its person: two can come to lie on one person, the fitted ones too. The
+    /// number of its person if nothing does.
+    fn without_others(
+        &mut self,
+        mut walk: TrackedWalk,
+        views: &[(usize, View)],
+    ) -> Result<TrackedWalk, usize> {
+        let least = self.options.start_frames;
+        // 1. Of a second model, what goes on with the person of the first.
+        loop {
+            let is_first = |other: &&TrackedWalk| walk.is_second_model(other, views) == Some(true);
+            let Some(first) = self.finished.iter().chain(&self.returned).find(is_first) else { break };
+            let (person, frames) = (first.person, first.first_and_last());
+            let number = walk.person;
+            let rest = frames.and_then(|frames| walk.outside(frames, least)).ok_or(number)?;
+            walk = self.of_person(rest, person);
+        }
+        // 2. The same of the others to which it is the first.
+        for k in (0..self.finished.len()).rev() {
+            if walk.is_second_model(&self.finished[k], views) == Some(false) {
+                let second = self.finished.remove(k);
+                let person = second.person;
+                match walk.first_and_last().and_then(|frames| second.outside(frames, least)) {
+                    Some(rest) => {
+                        walk = self.of_person(walk, person);
+                        self.finished.insert(k, rest);
+                    }
+                    None => self.withdraw(person, None, Reason::Beside),
+                }
+            }
+        }
+        Ok(walk)
+    }
+
+    /// A walk with the number of the person whom it turned out to be of.
+    fn of_person(&mut self, walk: TrackedWalk, person: usize) -> TrackedWalk {
+        if walk.person != person {
+            self.identities.withdraw(walk.person);
+            self.identities.is_back(person);
+        }
+        TrackedWalk { person, ..walk }
     }
 
     /// Completes the route and the frames of a walk that is over; returns where the person stands, if so.

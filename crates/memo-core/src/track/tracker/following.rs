@@ -6,13 +6,18 @@ use super::super::decisions::OUTSIDE_SHARE;
 use super::super::evidence::Evidence;
 use super::super::fit::views::Piece;
 use super::super::height::is_as_tall;
-use super::super::unexplained::beside_legs;
+use super::super::left_out::Reason;
+use super::super::unexplained::{beside_legs, never_has_legs};
 use super::super::walk::FrameEdges;
+use super::unfollowed::walk_boxes;
 use super::{TrackError, Tracker, WINDOW_MARGIN_PX, feet, whole};
 use crate::image::{Rectangle, Sides};
 use crate::model::{Camera, EllipticCylinder};
 use glam::DVec2;
 use rayon::prelude::*;
+
+/// Who has no legs of its own for so long is nobody, seconds: about two steps.
+const WITHOUT_LEGS_S: f64 = 1.0;
 
 impl Tracker {
     /// Sorts the people by distance and predicts each.
@@ -114,7 +119,23 @@ impl Tracker {
             self.people[k].turn(&self.options);
         }
         self.note_unexplained(evidence);
+        self.withdraw_without_legs();
         Ok(())
+    }
+
+    /// Withdraws models of nobody: started beside others, and for long enough without legs of their own. The others get the
+    /// contours back that they took.
+    fn withdraw_without_legs(&mut self) {
+        let is_nobody = |active: &mut Active| {
+            let ends = active.steps().first().zip(active.steps().last());
+            active.started_near
+                && ends.is_some_and(|(first, last)| last.time_s - first.time_s >= WITHOUT_LEGS_S)
+                && never_has_legs(&active.of_its_own)
+        };
+        let nobody: Vec<Active> = self.people.extract_if(.., is_nobody).collect();
+        for active in nobody {
+            self.withdraw(active.person, walk_boxes(&active), Reason::Beside);
+        }
     }
 
     /// Notes what changes beside the legs of everybody who is followed.

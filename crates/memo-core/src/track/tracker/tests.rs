@@ -753,6 +753,39 @@ fn a_second_model_of_somebody_whose_walk_was_taken_is_withdrawn() {
     assert_eq!([true, false].map(walks), [1, 1]);
 }
 
+/// One model loses the person, on whom another one was started, and either is the longer one.
+#[test]
+fn two_models_of_one_person_in_turn_have_one_number() {
+    for (end, start) in [(27, 14), (26, 13)] {
+        let mut tracker = following_two(0.0);
+        tracker.people[0].drop_from(end);
+        tracker.people[1].walk.keep(start..40);
+        tracker.people[1].started_near = false;
+        tracker.finish().unwrap();
+        let walks = tracker.take_finished();
+        assert_eq!(walks.iter().map(|walk| walk.person).collect::<Vec<_>>(), [0, 0]);
+        let mut frames: Vec<usize> =
+            walks.iter().flat_map(|walk| walk.steps().iter().map(|step| step.frame)).collect();
+        frames.sort_unstable();
+        assert_eq!(frames, (0..40).collect::<Vec<_>>());
+        assert_eq!(tracker.identities.count(), 1);
+    }
+}
+
+/// The other one is followed with all contours again before they are lost to nobody.
+#[test]
+fn who_never_has_legs_is_not_followed_for_long() {
+    let people = |share: f64, started_near: bool| {
+        let mut tracker = following_two(0.8);
+        tracker.people[1].started_near = started_near;
+        tracker.people[1].of_its_own = vec![share; 9];
+        tracker.advance(&evidence(40, &[])).unwrap();
+        tracker.people.iter().map(|active| active.person).collect::<Vec<_>>()
+    };
+    assert_eq!(people(0.0, true), [0]);
+    assert_eq!([people(0.5, true).len(), people(0.0, false).len()], [2, 2]);
+}
+
 /// What is left over from one person can look like a second one.
 #[test]
 fn who_was_started_beside_somebody_and_has_no_legs_is_withdrawn() {
