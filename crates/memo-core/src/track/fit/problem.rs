@@ -767,7 +767,7 @@ fn importance(sample: &Sample) -> f64 {
 /// need it to find the ground, and which of two fits is nearer, it tells like the rest of the foot.
 ///
 /// Of 82 drawn walks, distances from the camera are 6.4 cm off (root mean square) with a hundredth in the last steps, and 7.1 cm with
-/// a tenth. Nine of them were 8 cm too near on average with a tenth; drawn again without the shadow they are 0 to 6 cm off with a
+/// a tenth. Nine of them were 7 cm too near on average with a tenth; drawn again without the shadow they are 0 to 6 cm off with a
 /// tenth and 1 to 10 cm with a hundredth. With a quarter or a tenth in all steps, one of two recorded walks in clothes that
 /// hardly differ from the background came out 28 cm too far away with a quarter, and the other 6 degrees apart in pictures with
 /// less contrast with a tenth. Shadows cannot be told from shoes by their brightness: the lower half of a shoe is darker than the floor
