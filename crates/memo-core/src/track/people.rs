@@ -84,9 +84,9 @@ impl Identities {
         expected.map(|(person, _)| *person)
     }
 
-    /// Notes the end of a person's walk.
+    /// Notes the end of a person's walk, the last one of that person.
     pub fn end(&mut self, person: usize, sign: Sign) {
-        self.ended.retain(|(_, end)| end.is_expected(sign.time_s));
+        self.ended.retain(|(ended, end)| *ended != person && end.is_expected(sign.time_s));
         self.ended.push((person, sign));
     }
 
@@ -104,6 +104,12 @@ impl Identities {
     /// Expects nobody back.
     pub fn forget_ended(&mut self) {
         self.ended.clear();
+    }
+
+    /// Gives a walk of one person to another one.
+    pub fn pass_on(&mut self, from: usize, to: usize) {
+        self.walks[to] += 1;
+        self.withdraw(from);
     }
 
     /// Takes a walk of a person back, and the number with the last of them, if no later one is in use.
@@ -182,6 +188,25 @@ mod tests {
         assert_eq!(people.appear(&sign(3.0, 3.9, 1.2)), 0);
         assert_eq!(people.appear(&sign(3.0, 1.2, -1.1)), 1);
         assert_eq!(people.count(), 2);
+    }
+
+    /// The second walk turned out to be of the first person: its number is free again, and where the first one ended is known.
+    #[test]
+    fn a_walk_that_is_passed_on_leaves_its_number_and_the_end_of_the_other() {
+        let mut people = Identities::default();
+        assert_eq!([people.appear(&sign(0.0, 0.0, 1.2)), people.appear(&sign(0.5, 4.0, -1.0))], [0, 1]);
+        people.end(0, sign(2.0, 2.4, 1.2));
+        people.pass_on(1, 0);
+        assert_eq!((people.count(), people.known(&sign(3.0, 3.7, 1.2))), (1, Some(0)));
+        // It goes on to its own end, and there only is the person expected.
+        people.end(0, sign(4.0, 5.0, 1.2));
+        assert_eq!(people.known(&sign(4.5, 5.6, 1.2)), Some(0));
+        assert_eq!(people.known(&sign(2.5, 3.0, 1.2)), None);
+        // Both walks of the person have to be taken back.
+        people.withdraw(0);
+        assert_eq!(people.count(), 1);
+        people.withdraw(0);
+        assert_eq!(people.count(), 0);
     }
 
     #[test]

@@ -153,8 +153,7 @@ impl Tracker {
     /// A walk with the number of the person whom it turned out to be of.
     fn of_person(&mut self, walk: TrackedWalk, person: usize) -> TrackedWalk {
         if walk.person != person {
-            self.identities.withdraw(walk.person);
-            self.identities.is_back(person);
+            self.identities.pass_on(walk.person, person);
         }
         TrackedWalk { person, ..walk }
     }
