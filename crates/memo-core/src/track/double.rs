@@ -78,6 +78,14 @@ impl TrackedWalk {
         })
     }
 
+    /// The same of two walks that may have one number: nobody is in two places, so the shorter one is second.
+    pub(super) fn is_second_to(&self, other: &Self, views: &[(usize, View)]) -> Option<bool> {
+        if self.person == other.person && are_at_a_time(self.steps(), other.steps()) {
+            return Some(self.steps().len() <= other.steps().len());
+        }
+        self.is_second_model(other, views)
+    }
+
     /// First and last frame.
     pub(super) fn first_and_last(&self) -> Option<[usize; 2]> {
         Some([self.steps().first()?.frame, self.steps().last()?.frame])

@@ -97,6 +97,19 @@ fn without_an_empty_scene_boxes_tell_how_far_models_lie_on_each_other() {
     assert_eq!(beside(-0.45, 24, 16).is_second_model(&long, &[]), None, "common to both are six frames");
 }
 
+/// Whatever the pictures show: they may have got the number of one person for what another model is on.
+#[test]
+fn of_two_walks_at_a_time_with_one_number_the_shorter_is_second() {
+    let (long, short) = (beside(-0.5, 0, 30), beside(1.0, 4, 12));
+    let both = views(&short, &[&long, &short], 80);
+    assert_eq!(
+        [short.is_second_to(&long, &both), long.is_second_to(&short, &both)],
+        [Some(true), Some(false)]
+    );
+    assert_eq!(TrackedWalk { person: 1, ..short.clone() }.is_second_to(&long, &both), None);
+    assert_eq!(beside(1.0, 100, 12).is_second_to(&long, &both), None, "later");
+}
+
 /// The first goes on as the second, which is longer: in the frames of both the first is dropped.
 #[test]
 fn of_two_models_in_turn_each_keeps_its_own_frames() {

@@ -124,30 +124,29 @@ impl Tracker {
         views: &[(usize, View)],
     ) -> Result<TrackedWalk, usize> {
         let least = self.options.start_frames;
-        // 1. Of a second model, what goes on with the person of the first.
         loop {
-            let is_first = |other: &&TrackedWalk| walk.is_second_model(other, views) == Some(true);
-            let Some(first) = self.finished.iter().chain(&self.returned).find(is_first) else { break };
-            let (person, frames) = (first.person, first.first_and_last());
-            let number = walk.person;
-            let rest = frames.and_then(|frames| walk.outside(frames, least)).ok_or(number)?;
-            walk = self.of_person(rest, person);
-        }
-        // 2. The same of the others to which it is the first.
-        for k in (0..self.finished.len()).rev() {
-            if walk.is_second_model(&self.finished[k], views) == Some(false) {
-                let second = self.finished.remove(k);
-                let person = second.person;
-                match walk.first_and_last().and_then(|frames| second.outside(frames, least)) {
-                    Some(rest) => {
-                        walk = self.of_person(walk, person);
-                        self.finished.insert(k, rest);
-                    }
-                    None => self.withdraw(person, None, Reason::Beside),
-                }
+            // 1. Of a second model, what goes on with the person of the first.
+            let is_first = |other: &&TrackedWalk| walk.is_second_to(other, views) == Some(true);
+            if let Some(first) = self.finished.iter().chain(&self.returned).find(is_first) {
+                let (person, frames, number) = (first.person, first.first_and_last(), walk.person);
+                let rest = frames.and_then(|frames| walk.outside(frames, least)).ok_or(number)?;
+                walk = self.of_person(rest, person);
+                continue;
+            }
+            // 2. The same of one to which it is the first. If other walks are of that person, this one is too.
+            let is_second = |other: &TrackedWalk| walk.is_second_to(other, views) == Some(false);
+            let Some(k) = self.finished.iter().position(is_second) else { return Ok(walk) };
+            let second = self.finished.remove(k);
+            let person = second.person;
+            let rest = walk.first_and_last().and_then(|frames| second.outside(frames, least));
+            if rest.is_some() || self.finished.iter().any(|other| other.person == person) {
+                walk = self.of_person(walk, person);
+            }
+            match rest {
+                Some(rest) => self.finished.insert(k, rest),
+                None => self.withdraw(person, None, Reason::Beside),
             }
         }
-        Ok(walk)
     }
 
     /// A walk with the number of the person whom it turned out to be of.

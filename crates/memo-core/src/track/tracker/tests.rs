@@ -772,6 +772,22 @@ fn two_models_of_one_person_in_turn_have_one_number() {
     }
 }
 
+/// Of two walks at a time that have one number, the longer one stays.
+#[test]
+fn nobody_is_in_two_places() {
+    let mut tracker = following_two(3.0);
+    tracker.people[0].drop_from(14);
+    tracker.people[1].started_near = false;
+    tracker.people[1].person = 0;
+    tracker.identities.pass_on(1, 0);
+    tracker.finish().unwrap();
+    let walks = tracker.take_finished();
+    let frames: Vec<usize> =
+        walks.iter().flat_map(|walk| walk.steps().iter().map(|step| step.frame)).collect();
+    assert_eq!((walks.len(), frames, tracker.identities.count()), (1, (0..40).collect(), 1));
+    assert!((walks[0].rows()[0].torso_centre.y - 3.0).abs() < 0.1);
+}
+
 /// The other one is followed with all contours again before they are lost to nobody.
 #[test]
 fn who_never_has_legs_is_not_followed_for_long() {
