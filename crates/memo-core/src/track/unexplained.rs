@@ -39,8 +39,8 @@ const LEAST_FRAMES: usize = 13;
 /// The same of legs that are those of others, in this share of the frames.
 const LEAST_OWN_FRAMES: usize = 5;
 const MOSTLY: f64 = 0.9;
-/// Who has less in each frame of the first second has none: of two hidden people the most were 0.14 and 0.15, of a second model of
-/// somebody who walked alone 0.012.
+/// Who has less in every frame has none: in the first second, of two hidden people the most were 0.14 and 0.15, of a second model of
+/// somebody who walked alone 0.012. Nobody else was looked at.
 const NEVER_SHARE: f64 = 0.05;
 
 /// Changes in a frame that bodies do not explain, as shares of the area of two legs.

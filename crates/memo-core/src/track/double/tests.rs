@@ -97,7 +97,7 @@ fn without_an_empty_scene_boxes_tell_how_far_models_lie_on_each_other() {
     assert_eq!(beside(-0.45, 24, 16).is_second_model(&long, &[]), None, "common to both are six frames");
 }
 
-/// Whatever the pictures show: they may have got the number of one person for what another model is on.
+/// Whatever the pictures show: a person is not in two places.
 #[test]
 fn of_two_walks_at_a_time_with_one_number_the_shorter_is_second() {
     let (long, short) = (beside(-0.5, 0, 30), beside(1.0, 4, 12));

@@ -770,6 +770,10 @@ fn importance(sample: &Sample) -> f64 {
 /// (mean) where it counted fully in all steps, and 18 cm with a tenth in the last ones; of 28 clips, most in other clothes, 3 cm with
 /// both. With a quarter or a tenth in all steps it was 18 and 16 cm, but one of two recorded walks in such clothes came out 28 cm too
 /// far away with a quarter, and the other 6 degrees apart in pictures with less contrast with a tenth.
+///
+/// With a hundredth in the last steps, distances of 82 clips are 6.4 cm off (root mean square) instead of 7.1, but two of the walkers
+/// of `demo_scene` whose boxes are given come out more than 5 cm off across the path. The shadow is what is left: nine clips are 7 cm
+/// too near (mean), and drawn again without it 0 to 6 cm off.
 const SOLE: f64 = 0.1;
 
 /// What one whole outline costs in the [total cost](FitQuality::total_cost) if none of its edges is near the line. A sample of it
