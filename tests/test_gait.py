@@ -212,6 +212,9 @@ def test_without_a_fit_no_difference_is_reported(monkeypatch):
     monkeypatch.setattr(tracking, "symmetry_sentences", lambda table, walk: [said])
     monkeypatch.setattr(tracking, "departure_sentences", lambda departures: ["The left knee is less flexed."])
     assert said in track.sentences and "The left knee is less flexed." in track.sentences
+    with monkeypatch.context() as patched:
+        patched.setattr(tracking, "is_heading_open", lambda walk: True)
+        assert "The left knee is less flexed." not in track.sentences
     empty = np.median(scene.frames, axis=0).astype(np.uint8)
     lost = memo.Track([memo.fit_walk(track.walks[0], [empty] * len(scene.frames))], track.seek_report)
     assert any("were not measured" in sentence for sentence in lost.sentences)

@@ -639,7 +639,7 @@ class Treadmill:
     belt_mps: Final[float]
     belt_sd_mps: Final[float]
     other_heading_rad: Final[float | None]
-    """The heading that looks alike from the camera, with left and right exchanged; None if there is none."""
+    """The heading that looks alike from the camera; None if there is none."""
     p_other_heading: Final[float | None]
     """Probability of that heading."""
 

@@ -29,7 +29,7 @@ from memo.plausible import (
     tilt_sentences,
 )
 from memo.table import data_frame
-from memo.treadmill import treadmill_figures, treadmill_sentence
+from memo.treadmill import is_heading_open, treadmill_figures, treadmill_sentence
 from memo.turning import turned_deg, turning_words
 from memo.wording import counted
 
@@ -438,7 +438,8 @@ class Track:
                 told.append(f"Left and right may be swapped ({chance}): check them before use.")
             if _is_in_place(walk):
                 told += [] if unseen else symmetry_sentences(self.gait_parameters, index)
-                told += departure_sentences(walk.departures) if walk.p_swapped <= LIKELY_SWAPPED else []
+                is_sure = walk.p_swapped <= LIKELY_SWAPPED and not is_heading_open(walk)
+                told += departure_sentences(walk.departures) if is_sure else []
             whose = ""
             if len(self.walks) > 1:
                 whose = f"Walk {index + 1} of {len(self.walks)} (person {self.people[index] + 1}): "

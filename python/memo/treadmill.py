@@ -9,10 +9,15 @@ import numpy as np
 if TYPE_CHECKING:
     from memo._memo import Walk
 
-__all__ = ["treadmill_figures", "treadmill_sentence"]
+__all__ = ["is_heading_open", "treadmill_figures", "treadmill_sentence"]
 
 LIKELY_HEADING = 0.2
-"""From this probability on, the other heading is reported in the sentence."""
+"""From this probability on, the other heading is reported in the sentence, and nothing that depends on it."""
+
+
+def is_heading_open(walk: Walk) -> bool:
+    """True if a walk on a treadmill may well have the other heading that looks alike."""
+    return walk.treadmill is not None and (walk.treadmill.p_other_heading or 0) >= LIKELY_HEADING
 
 
 def treadmill_figures(walk: Walk) -> dict[str, Any]:
@@ -36,12 +41,11 @@ def treadmill_sentence(walk: Walk, seconds: float, cadence: float) -> str:
     steps = f", {cadence:.0f} steps per minute" if np.isfinite(cadence) else ""
     pace = f"belt speed {found.belt_mps:.2f} \u00b1 {found.belt_sd_mps:.2f} m/s{steps}"
     said = f"Somebody walks on a treadmill for {seconds:.1f} s, {pace}."
-    if found.other_heading_rad is not None and (found.p_other_heading or 0) >= LIKELY_HEADING:
+    if is_heading_open(walk):
+        assert found.other_heading_rad is not None
         here, there = (np.degrees(angle) % 360 for angle in (_heading_rad(walk), found.other_heading_rad))
-        said += (
-            f" The heading is {here:.0f} degrees, or {there:.0f} degrees with left and right exchanged "
-            f"(probability {found.p_other_heading:.0%})."
-        )
+        chance = f"probability {found.p_other_heading:.0%}"
+        said += f" The heading is {here:.0f} degrees, or {there:.0f} degrees ({chance})."
     return said
 
 

@@ -113,7 +113,7 @@ result! {
         belt_mps: f64 = found.belt.speed_mps,
         /// Its standard deviation, m/s.
         belt_sd_mps: f64 = found.belt.sd_mps,
-        /// The heading that looks alike from the camera, with left and right exchanged, radians; None if there is none.
+        /// The heading that looks alike from the camera, radians; None if there is none.
         other_heading_rad: Option<f64> = found.mirrored.map(|other| other.heading_rad),
         /// Probability of that heading.
         p_other_heading: Option<f64> = found.mirrored.map(|other| other.probability),

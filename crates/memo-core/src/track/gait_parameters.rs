@@ -52,8 +52,8 @@ use crate::estimate::line::line_through;
 use crate::model::ASSUMED_FOCAL_SD;
 use crate::model::skeleton::Side;
 
-/// If the probability that sides are swapped, or that the person walks in the other direction, is larger, no
-/// value by side is reported.
+/// If the probability that sides are swapped, or that the person walks in the other direction or has the other heading on a
+/// treadmill, is larger, no value by side is reported.
 pub const LIKELY_MISTAKEN: f64 = 0.2;
 
 /// Step variability of a healthy adult, as a share of step length or step time.
@@ -252,7 +252,7 @@ impl TrackedWalk {
     /// Range and peak of a measured joint over at least a cycle, degrees; joint 0 is the hip, 1 the knee.
     fn motion(&self, side: Side, joint: usize) -> Option<JointMotion> {
         let fit = self.fitted()?;
-        if self.p_swapped() > LIKELY_MISTAKEN {
+        if self.p_swapped().max(self.p_other_heading()) > LIKELY_MISTAKEN {
             return None;
         }
         let index = usize::from(side == Side::Left);
@@ -281,7 +281,8 @@ impl TrackedWalk {
 
     /// Steps by side; `None` if the sides are ambiguous, the walk is backward or the fit failed.
     fn sides(&self, whole: &Whole) -> Option<Sides> {
-        let is_sure = self.p_swapped() <= LIKELY_MISTAKEN && self.start.p_other_direction <= LIKELY_MISTAKEN;
+        let mistakes = [self.p_swapped(), self.start.p_other_direction, self.p_other_heading()];
+        let is_sure = mistakes.iter().all(|&p| p <= LIKELY_MISTAKEN);
         // Without the fit that was wanted, contacts are those of the average gait, and a hidden leg looks like an uneven step.
         let is_misfit = matches!(self.fit, Some(Err(_)));
         if !is_sure || is_misfit || self.direction() == Direction::Backward {

@@ -133,6 +133,11 @@ impl TrackedWalk {
         }
     }
 
+    /// Probability that somebody on a treadmill has the other heading that looks alike, in which the steps are others.
+    pub fn p_other_heading(&self) -> f64 {
+        self.fitted().and_then(|fit| fit.mirrored).map_or(0.0, |mirrored| mirrored.probability)
+    }
+
     /// True if a height was given and the fit contradicts it by more than three standard deviations.
     pub fn is_height_contradicted(&self) -> bool {
         let measured = self.fitted().and_then(|fit| fit.height);

@@ -203,7 +203,7 @@ pub struct WalkFit {
     pub quality: FitQuality,
 }
 
-/// A heading in which the outlines are almost the same, mirrored at the line of sight, with left and right exchanged.
+/// A heading in which the outlines are almost the same, mirrored at the line of sight, mostly with left and right exchanged.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MirroredHeading {
     /// Direction the body would face, radians about world Z.

@@ -404,7 +404,7 @@ impl<'a> Problem<'a> {
 
     /// Cost of the edges of a whole outline in every frame, and minus twice the logarithm of the prior probability of body,
     /// height and ground. A model that hides has fewer edges, so they count by their mean.
-    pub(super) fn total_cost(&self, unknowns: &Unknowns, seen: &Seen) -> f64 {
+    fn total_cost(&self, unknowns: &Unknowns, seen: &Seen) -> f64 {
         let of_edges = OUTLINE_COST * self.visible_share * self.frames.len() as f64 * seen.mean_cost();
         let whole = &unknowns.whole;
         let off = |n: usize, prior: &Prior| (self.of_its_size(whole, n) - prior.mean) / prior.sd;
@@ -414,6 +414,11 @@ impl<'a> Problem<'a> {
         let of_ground: f64 =
             (0..self.frames.len()).map(|k| self.ground_precision() * above_m(k).powi(2)).sum();
         of_edges + of_body + of_height + of_ground
+    }
+
+    /// The same of a fit.
+    pub(super) fn total_cost_of(&self, fitted: &Fitted) -> f64 {
+        self.total_cost(&fitted.unknowns, &fitted.seen)
     }
 
     /// Weight of the height of the lower sole in one frame: its error is common to about ten independent frames.
