@@ -1,28 +1,29 @@
-//! The least-squares problem of the fit: its steps and normal equations.
+//! The least-squares problem of the fit: what is fitted, from which gait it starts, and in which steps. `step` is one of these steps,
+//! `cost` what edges and priors count, `outcome` what the fit says of the person.
 
+mod cost;
 mod outcome;
+mod step;
+
+pub(super) use step::{Room, Width};
 
 use super::contrast::Contrast;
-use super::edge_search::{Border, Reach, View};
-use super::lines::{Figure, KINDS, Sample, SurfacePoint, Workspace, gradient, row_of, samples};
-use super::normal::{Chain, FigureTerms};
-use super::route::{Bend, figure_slopes};
-use super::seen::{LEAST_STEP, Seen};
+use super::edge_search::View;
+use super::lines::{Figure, KINDS, Workspace, samples};
+use super::route::Bend;
+use super::seen::Seen;
 use super::unknowns::{
-    BEND, BODY, FRAME, FRAME_ALONG, FRAME_ANGLES, FRAME_HEIGHT, FRAME_PHASE, GROUND, JOINTS, LEAN_SD_RAD,
-    Prior, SHANK, STATURE, Slope, THIGH, THIGH_OVER_SHANK, Unknowns, WHOLE, WHOLE_ACROSS, WHOLE_BEND,
-    WHOLE_GROUND, WHOLE_HEADING, WHOLE_LEAN, body, excess, flatten, length, mean_of, posture, priors, slopes,
-    sway_m,
+    FRAME, FRAME_ALONG, FRAME_HEIGHT, FRAME_PHASE, LEAN_SD_RAD, Prior, Unknowns, WHOLE_ACROSS, WHOLE_HEADING,
+    WHOLE_LEAN, body, flatten, mean_of, posture, priors, sway_m,
 };
 use super::{FitError, FitOptions, LEAST_FRAMES, WalkFit, sides};
-use crate::estimate::arrow::{Arrow, FrameTerms, Solution, velocity_change};
-use crate::model::body::Part;
+use crate::estimate::arrow::Solution;
 use crate::model::{Camera, Gait, GaitStyle, Walker};
 use crate::track::height::BodyHeight;
 use crate::track::route::Route;
 use crate::track::search::{Hypothesis, Path};
-use glam::{DVec2, DVec3};
-use nalgebra::{DMatrix, DVector};
+use cost::SOLE;
+use glam::DVec2;
 use rayon::prelude::*;
 
 /// A frame to be fitted: its time, its picture around the person, and where the tracker found the person.
@@ -152,22 +153,6 @@ enum Stage {
 const STEPS: [usize; 3] = [4, 4, 4];
 /// The first step with what single frames deviate.
 const FRAMES_STEP: usize = STEPS[0] + STEPS[1];
-/// How far edges are searched, and the distance at which an edge counts a quarter: shares of the person's height at
-/// the first and at the last step.
-const REACH: [f64; 2] = [0.06, 0.02];
-const SCALE: [f64; 2] = [0.03, 0.008];
-/// Where the background is beyond an outline: so far from it, a share of the person's height. Farther out is another limb, nearer
-/// the blur of what moves. Between 0.030 and 0.034 hip and knee differ little, with 0.040 they are in dull clothes 0.5 degrees worse,
-/// with 0.022 the knee.
-const BEYOND: f64 = 0.033;
-/// So many frames in a row are a task, and the normal equations of so many tasks are in memory at a time.
-const FRAMES_OF_TASK: usize = 4;
-const TASKS_AT_ONCE: usize = 64;
-/// Sample points per body height. Their edges err together, so each counts with a standard deviation of their
-/// distance from each other.
-const SAMPLES_PER_HEIGHT: f64 = 75.0;
-const LEAST_SPACING_PX: f64 = 2.0;
-const LEAST_REACH_PX: f64 = 4.0;
 
 /// From which gait a fit starts is decided by at most this many frames, about evenly spaced, but by at least one in so many
 /// seconds: steps take half a second.
@@ -375,11 +360,6 @@ impl<'a> Problem<'a> {
         Self { frames, priors: self.priors.clone(), ..*self }
     }
 
-    /// By what starts are compared: the cost of all edges. Where others hide a part, a model could lower it by hiding behind them.
-    fn cost(&self, seen: &Seen) -> f64 {
-        if self.is_hidden() { seen.mean_cost() } else { seen.cost }
-    }
-
     /// The first steps from one gait, and their cost.
     pub(super) fn started(&self, phase: f64, gait: StartGait) -> Option<(f64, Unknowns)> {
         let mut unknowns = self.start(phase);
@@ -400,30 +380,6 @@ impl<'a> Problem<'a> {
             seen = self.step(&mut unknowns, &self.width(n, height_px), Stage::Curves)?.0;
         }
         Some([self.cost(&seen), self.total_cost(&unknowns, &seen)])
-    }
-
-    /// Cost of the edges of a whole outline in every frame, and minus twice the logarithm of the prior probability of body,
-    /// height and ground. A model that hides has fewer edges, so they count by their mean.
-    fn total_cost(&self, unknowns: &Unknowns, seen: &Seen) -> f64 {
-        let of_edges = OUTLINE_COST * self.visible_share * self.frames.len() as f64 * seen.mean_cost();
-        let whole = &unknowns.whole;
-        let off = |n: usize, prior: &Prior| (self.of_its_size(whole, n) - prior.mean) / prior.sd;
-        let of_body: f64 = self.priors.iter().enumerate().map(|(n, prior)| off(n, prior).powi(2)).sum();
-        let of_height = ((excess(whole) - self.excess.mean) / self.excess.sd).powi(2);
-        let above_m = |k: usize| self.figure(unknowns, k).lowest_point().world.z - whole[WHOLE_GROUND];
-        let of_ground: f64 =
-            (0..self.frames.len()).map(|k| self.ground_precision() * above_m(k).powi(2)).sum();
-        of_edges + of_body + of_height + of_ground
-    }
-
-    /// The same of a fit.
-    pub(super) fn total_cost_of(&self, fitted: &Fitted) -> f64 {
-        self.total_cost(&fitted.unknowns, &fitted.seen)
-    }
-
-    /// Weight of the height of the lower sole in one frame: its error is common to about ten independent frames.
-    fn ground_precision(&self) -> f64 {
-        self.ground_sd_m.powi(-2) / (self.frames.len() as f64 / GROUND_FRAMES).max(1.0)
     }
 
     /// The other steps.
@@ -517,233 +473,6 @@ impl<'a> Problem<'a> {
         let figure = self.figure(unknowns, unknowns.frames.len() / 2);
         self.camera.pixel_height_at(figure.pelvis.with_z(0.0), figure.body.height_m)
     }
-
-    /// One Gauss-Newton step of the unknowns of a stage.
-    fn step(&self, unknowns: &mut Unknowns, width: &Width, stage: Stage) -> Option<(Seen, Solution)> {
-        // While only curves are fitted, frames have no angles of their own.
-        let block = if stage == Stage::Frames { FRAME } else { FRAME_ANGLES };
-        let mut arrow = Arrow::new(self.frames.len(), block, WHOLE);
-        let mut seen = Seen::default();
-        let frames: Vec<usize> = (0..self.frames.len()).collect();
-        // The terms of all frames of a long walk would need much memory at once. Those of a task are added in their order,
-        // whatever the number of threads.
-        for frames in frames.chunks(TASKS_AT_ONCE * FRAMES_OF_TASK) {
-            let terms = frames.par_chunks(FRAMES_OF_TASK).map_init(Room::default, |room, frames| {
-                let mut terms = FrameTerms::new(WHOLE);
-                let mut seen = Seen::default();
-                for &frame in frames {
-                    seen.add(&self.add_frame(unknowns, frame, stage, width, room, &mut terms));
-                }
-                (frames[0], terms, seen)
-            });
-            for (first, terms, of_frames) in terms.collect::<Vec<_>>() {
-                arrow.add_frames(first, &terms);
-                seen.add(&of_frames);
-            }
-        }
-        self.add_priors(unknowns, block, &mut arrow);
-        let solution = arrow.solve()?;
-        for (x, step) in unknowns.whole.iter_mut().zip(solution.whole.iter()) {
-            *x += step;
-        }
-        let moved = unknowns.frames.iter_mut().flat_map(|frame| &mut frame[..block]);
-        moved.zip(solution.frames.iter()).for_each(|(x, step)| *x += step);
-        Some((seen, solution))
-    }
-
-    /// Adds the normal equations of one frame; returns what was seen.
-    fn add_frame(
-        &self,
-        unknowns: &Unknowns,
-        frame: usize,
-        stage: Stage,
-        width: &Width,
-        room: &mut Room,
-        terms: &mut FrameTerms,
-    ) -> Seen {
-        let block = if stage == Stage::Frames { FRAME } else { FRAME_ANGLES };
-        let (figure, normal, right, seen) = self.figure_terms(unknowns, frame, width, room);
-        slopes(&self.walker.gait, &unknowns.whole, &unknowns.frames[frame], &mut room.slopes);
-        // That the heading changes along a route does not place the person on it: who turns does not face right along the
-        // way. With that slope, two of ten drawn people on arcs are 8 and 10 cm off instead of 1 and 2.
-        if let Some(bend) = self.bend.filter(|_| stage != Stage::Start) {
-            let along_m = self.along(&unknowns.frames[frame]);
-            for (j, [moved, turned, _]) in bend.terms(along_m).into_iter().enumerate() {
-                let slopes = figure_slopes(&figure, [moved, turned]);
-                room.slopes.extend(slopes.map(|(q, slope)| (q, WHOLE_BEND + j, slope)));
-            }
-        }
-        room.chain.add(&normal, &right, &room.slopes, block, terms);
-        seen
-    }
-
-    /// The figure of a frame, the normal equations over its coordinates, and what was seen.
-    pub(super) fn figure_terms(
-        &self,
-        unknowns: &Unknowns,
-        frame: usize,
-        width: &Width,
-        room: &mut Room,
-    ) -> (Figure, DMatrix<f64>, DVector<f64>, Seen) {
-        let figure = self.figure(unknowns, frame);
-        let work = &mut room.work;
-        let view = &self.frames[frame].view;
-        samples(&figure, &view.others, self.camera, &unknowns.whole, width.spacing_px(), work);
-        let mut terms = FigureTerms::new();
-        let mut seen = Seen::default();
-        let Workspace { samples, motion, profile, .. } = work;
-        for sample in samples.iter() {
-            let border = match sample.is_outer {
-                true => Border::Outer { body_level: self.body_levels[row_of(sample.point.part)] },
-                false => Border::Inner,
-            };
-            let Some(edge) = view.search(sample.point_px, sample.normal, &width.reach, border, profile)
-            else {
-                continue;
-            };
-            let importance = importance(sample);
-            let [cost, near] = robust(edge.offset_px / width.scale_px);
-            seen.count(sample, &edge, importance * cost);
-            if edge.strength < LEAST_STEP {
-                continue;
-            }
-            let clear = edge.strength / (edge.strength + CLEAR_STEP);
-            let trust = if is_sole(sample) { width.sole } else { 1.0 };
-            let weight = importance * trust * near * clear / width.sd_px().powi(2);
-            figure.motion(&sample.point, motion);
-            let n_j = gradient(self.camera, sample.point.world, sample.normal);
-            terms.add(motion.iter().map(|(q, dx)| (*q, n_j.dot(*dx))), edge.offset_px, weight);
-        }
-        // The head ends where the changes do, but for what hair and the windows of the change detection make of it.
-        if let Some((crown, off_px)) = view.crown_px.and_then(|crown_px| self.crown(&figure, crown_px)) {
-            let free_px = CROWN_FREE * width.height_px;
-            let beyond_px = off_px - off_px.clamp(-free_px, free_px);
-            let weight = if beyond_px == 0.0 { 0.0 } else { (CROWN_SD * width.height_px).powi(-2) };
-            figure.motion(&crown, motion);
-            let n_j = gradient(self.camera, crown.world, DVec2::NEG_Y);
-            terms.add(motion.iter().map(|(q, dx)| (*q, n_j.dot(*dx))), beyond_px, weight);
-        }
-        // The lower foot stands on the ground, whose height is an unknown.
-        let lowest = figure.lowest_point();
-        figure.motion(&lowest, motion);
-        motion.retain(|&(q, _)| width.is_placed || q < BODY);
-        motion.push((GROUND, DVec3::NEG_Z));
-        let above_m = lowest.world.z - unknowns.whole[WHOLE_GROUND];
-        terms.add(motion.iter().map(|(q, dx)| (*q, dx.z)), -above_m, self.ground_precision());
-        let (normal, right) = terms.sums();
-        (figure, normal, right, seen)
-    }
-
-    /// The top of the head, and how far the crown of the changes is above it, pixels.
-    fn crown(&self, figure: &Figure, crown_px: f64) -> Option<(SurfacePoint, f64)> {
-        let head = &figure.posed.cylinders[Part::Head as usize];
-        let world = head.centre() + head.world_from_cylinder.matrix3.z_axis * head.half_length;
-        let point_px = self.camera.project(world)?;
-        let point = SurfacePoint { part: Part::Head, world, radius: DVec3::ZERO, z: 1.0, taper: 0.0 };
-        Some((point, point_px.y - crown_px))
-    }
-
-    /// A length of the mean person, as a share of the height, and zero of what is no length.
-    fn share(&self, unknown: usize) -> f64 {
-        let length = length(&self.walker.body.proportions, unknown);
-        length.map_or(0.0, |average| average + self.priors[unknown].mean)
-    }
-
-    /// An unknown of somebody of the walker's height with the same proportions: of a person who is taller by e, the priors are of
-    /// x - (average + mean) e.
-    fn of_its_size(&self, whole: &[f64], unknown: usize) -> f64 {
-        whole[unknown] - self.share(unknown) * excess(whole)
-    }
-
-    /// The slopes of a sum of such unknowns.
-    fn size_terms(&self, sum: &[(usize, f64)]) -> Vec<(usize, f64)> {
-        let share: f64 = sum.iter().map(|&(n, factor)| factor * self.share(n)).sum();
-        let grown = STATURE.iter().map(|&part| (part, -share)).filter(|_| share != 0.0);
-        sum.iter().copied().chain(grown).collect()
-    }
-
-    /// Priors of people, of the stated height and of smooth motion.
-    fn add_priors(&self, unknowns: &Unknowns, block: usize, arrow: &mut Arrow) {
-        for (n, prior) in self.priors.iter().enumerate() {
-            let off = self.of_its_size(&unknowns.whole, n);
-            arrow.add_whole_row(&self.size_terms(&[(n, 1.0)]), prior.mean - off, prior.sd.powi(-2));
-        }
-        let [thigh, shank] = [THIGH, SHANK].map(|n| self.of_its_size(&unknowns.whole, n));
-        let Prior { mean, sd } = THIGH_OVER_SHANK;
-        let terms = self.size_terms(&[(THIGH, 1.0), (SHANK, -1.0)]);
-        let off = mean - (thigh - shank);
-        arrow.add_whole_row(&terms, off, student(off / sd) * sd.powi(-2));
-        for (row, precision) in self.bend.iter().flat_map(Bend::priors) {
-            let terms: [(usize, f64); BEND] = std::array::from_fn(|j| (WHOLE_BEND + j, row[j]));
-            let now: f64 = terms.iter().map(|&(n, factor)| factor * unknowns.whole[n]).sum();
-            arrow.add_whole_row(&terms, -now, precision);
-        }
-        let excess = excess(&unknowns.whole);
-        // An unknown height is held until the curves are found: long legs look like bent ones at first.
-        let Prior { mean, sd } =
-            if block == FRAME { self.excess } else { Prior { mean: 0.0, sd: self.options.height_sd } };
-        arrow.add_whole_row(&STATURE.map(|n| (n, 1.0)), mean - excess, sd.powi(-2));
-        let joint_of = |unknown: usize| (unknown - FRAME_ANGLES) % JOINTS;
-        for (k, frame) in unknowns.frames.iter().enumerate() {
-            for (unknown, value) in frame.iter().enumerate().take(block).skip(FRAME_ANGLES) {
-                let sd = match joint_of(unknown) {
-                    0 | 1 => self.options.frame_sd_rad,
-                    _ => 2.0 * self.options.frame_sd_rad,
-                };
-                arrow.add_row(&[(arrow.index(k, unknown), 1.0)], -value, sd.powi(-2));
-            }
-        }
-        // Velocities change as in a random walk.
-        for k in 1..unknowns.frames.len().saturating_sub(1) {
-            let time = |k: usize| self.frames[k].time_s;
-            let (before_s, after_s) = (time(k) - time(k - 1), time(k + 1) - time(k));
-            let (factors, variance_s) = velocity_change(before_s, after_s);
-            for (unknown, rate) in RATES.iter().enumerate().take(block) {
-                let terms = [0, 1, 2].map(|n| (arrow.index(k - 1 + n, unknown), factors[n]));
-                let now: f64 = (0..3).map(|n| factors[n] * unknowns.frames[k - 1 + n][unknown]).sum();
-                arrow.add_row(&terms, -now, 1.0 / (rate * rate * variance_s));
-            }
-        }
-    }
-}
-
-/// Search width and weights of one step.
-#[derive(Debug, Clone)]
-pub(super) struct Width {
-    reach: Reach,
-    scale_px: f64,
-    height_px: f64,
-    /// What the edge of a sole counts in the step, of what it counts in the cost.
-    sole: f64,
-    /// False in the steps that move the person to the ground. There the ground does not change the lengths of the legs: a person
-    /// who starts too low would get short legs, and the feet would be sought in the shanks.
-    is_placed: bool,
-}
-
-impl Width {
-    fn of_step(n: usize, height_px: f64) -> Self {
-        let done = n as f64 / (STEPS.iter().sum::<usize>() - 1) as f64;
-        let at = |[first, last]: [f64; 2]| height_px * (first + (last - first) * done);
-        let reach = Reach::new(at(REACH).max(LEAST_REACH_PX), BEYOND * height_px);
-        Self { reach, scale_px: at(SCALE).max(1.0), height_px, sole: 1.0, is_placed: true }
-    }
-
-    fn spacing_px(&self) -> f64 {
-        (self.height_px / SAMPLES_PER_HEIGHT).max(LEAST_SPACING_PX)
-    }
-
-    /// Standard deviation of the edge of one sample.
-    fn sd_px(&self) -> f64 {
-        (self.height_px / SAMPLES_PER_HEIGHT).max(1.0)
-    }
-}
-
-/// Working memory of a thread.
-#[derive(Debug, Default)]
-pub(super) struct Room {
-    work: Workspace,
-    slopes: Vec<Slope>,
-    chain: Chain,
 }
 
 /// A fit with one choice of sides.
@@ -754,67 +483,8 @@ pub(super) struct Fitted {
     height_px: f64,
 }
 
-/// An outline counts fully, a foot half, because shoes have edges of their own, and so do clothes inside the body.
-/// The top of the thigh belongs to buttock and pelvis as much.
-fn importance(sample: &Sample) -> f64 {
-    let row = row_of(sample.point.part);
-    let of_border = match (sample.is_outer, row) {
-        (true, 7) => 0.5,
-        (true, _) => 1.0,
-        (false, _) => 0.25,
-    };
-    let is_top_of_thigh = row == 5 && sample.point.z > 1.0 - 2.0 * 0.28;
-    let of_limb = if (2..=4).contains(&row) { 0.3 } else { 1.0 };
-    of_limb * if is_top_of_thigh { 0.3 * of_border } else { of_border }
-}
-
-/// What the edge of a sole counts in the last steps: below it lies the shadow of the shoe, whose edges are as strong. The first steps
-/// need it to find the ground, and which of two fits is nearer, it tells like the rest of the foot.
-///
-/// Of 35 clips of four drawn people in clothes that hardly differ from the background, the distance from the camera was 22 cm off
-/// (mean) where it counted fully in all steps, and 18 cm with a tenth in the last ones; of 28 clips, most in other clothes, 3 cm with
-/// both. With a quarter or a tenth in all steps it was 18 and 16 cm, but one of two recorded walks in such clothes came out 28 cm too
-/// far away with a quarter, and the other 6 degrees apart in pictures with less contrast with a tenth.
-///
-/// With a hundredth in the last steps, distances of 82 clips are 6.4 cm off (root mean square) instead of 7.1, but two of the walkers
-/// of `demo_scene` whose boxes are given come out more than 5 cm off across the path. The shadow is what is left: nine clips are 7 cm
-/// too near (mean), and drawn again without it 0 to 6 cm off.
-const SOLE: f64 = 0.1;
-
-/// What one whole outline costs in the [total cost](FitQuality::total_cost) if none of its edges is near the line. A sample of it
-/// has a tenth of the weight that it has in a step, because what the model lacks is common to neighbouring samples and frames:
-/// with the full weight, four of 14 drawn walks in clothes that hardly differ from the background are moved 14 to 47 cm too
-/// far, with legs that are too short.
-const OUTLINE_COST: f64 = 7.0;
-
-/// True at the lower border of a foot.
-fn is_sole(sample: &Sample) -> bool {
-    sample.is_outer && row_of(sample.point.part) == 7 && sample.normal.y > 0.0
-}
-
-/// The cost of an edge at a distance x, x² / (1 + x²), and the weight with which least squares lower it,
-/// 1 / (1 + x²)² (Geman and McClure, Bull Int Stat Inst 52:5, 1987).
-fn robust(distance: f64) -> [f64; 2] {
-    let near = 1.0 / (1.0 + distance * distance);
-    [1.0 - near, near * near]
-}
-
-/// The weight with which least squares lower the negative logarithm of Student's t of four degrees of freedom, of a distance in
-/// standard deviations. With it, people may be far from the mean whose skeletons nobody has measured.
-fn student(distance: f64) -> f64 {
-    const FREEDOM: f64 = 4.0;
-    (FREEDOM + 1.0) / (FREEDOM + distance * distance)
-}
-
-/// The changes may end so far from the crown, and the standard deviation of what is beyond, shares of the person's height.
-/// Models that are on the person are within 0.010 of them ([`POORLY_CROWN`](super::super::decisions)).
-const CROWN_FREE: f64 = 0.012;
-const CROWN_SD: f64 = 0.01;
-/// A step of this many grey levels counts half as much as a large one.
-const CLEAR_STEP: f64 = 15.0;
-/// Standard deviation of the height of a standing foot, metres, and the number of independent feet in a walk.
+/// Standard deviation of the height of a standing foot, metres.
 const GROUND_SD_M: f64 = 0.015;
-const GROUND_FRAMES: f64 = 10.0;
 /// The same, and the standard deviations of heading and distance, in an assumed camera.
 const ASSUMED_GROUND_SD_M: f64 = 0.06;
 const ASSUMED_HEADING_SD_RAD: f64 = 0.02;
@@ -825,16 +495,6 @@ const HELD_SD: f64 = 1e-3;
 const FIXED_SD_RAD: f64 = 1e-5;
 /// Standard deviation of the heading about the start's, where nothing but the outlines shows it.
 const UNSEEN_HEADING_SD_RAD: f64 = 0.5;
-/// Random walk of the velocities of the frames' unknowns: per square root of a second, m/s of place and height,
-/// cycles/s of the phase, rad/s of the angles. Of the size that prototypes on motion-captured walks used; the
-/// result hardly depends on them.
-const RATES: [f64; FRAME] = {
-    let mut rates = [75.0 * std::f64::consts::PI / 180.0; FRAME];
-    rates[FRAME_ALONG] = 0.5;
-    rates[FRAME_HEIGHT] = 0.75;
-    rates[FRAME_PHASE] = 0.19;
-    rates
-};
 
 #[cfg(test)]
 pub(in crate::track::fit) mod tests;

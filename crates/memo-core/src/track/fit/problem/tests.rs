@@ -1,10 +1,19 @@
-use super::super::unknowns::{ALONG, CROWN, HEIGHT, angles};
+use super::super::lines::{Sample, SurfacePoint};
+use super::super::unknowns::{
+    ALONG, CROWN, FRAME_ANGLES, HEIGHT, JOINTS, SHANK, THIGH, THIGH_OVER_SHANK, WHOLE, WHOLE_GROUND, angles,
+    excess,
+};
+use super::cost::{importance, is_sole, robust};
 use super::outcome::Form;
 use super::*;
+use crate::estimate::arrow::Arrow;
 use crate::image::Image;
 use crate::model::Body;
+use crate::model::body::Part;
 use crate::synth::scene::{SceneOptions, SynthScene, Truth};
 use crate::track::search::tests::{camera, walker};
+use glam::DVec3;
+use nalgebra::DVector;
 
 #[test]
 fn a_short_walk_and_an_empty_picture_are_no_person() {
