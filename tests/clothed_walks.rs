@@ -6,7 +6,7 @@
 
 use glam::DVec2;
 use memo_core::synth::{ClothedOptions, FootContact, Mover, Pause};
-use memo_core::track::fit::{FitError, FitOptions, WalkFit};
+use memo_core::track::fit::{FitError, FitOptions, MirroredHeading, WalkFit};
 use memo_core::track::start::Direction;
 use memo_core::track::{EventKind, Row};
 use memo_core::{
@@ -456,6 +456,18 @@ fn a_walk_on_a_treadmill_is_recognised_and_has_its_belt_s_speed() {
                 low < truth && truth < high && high - low < 0.3 * truth,
                 "{quantity:?}: {low}..{high}, {truth}"
             );
+        }
+        // In the other heading the steps are others, so while it is open no side is told.
+        for (probability, is_told) in [(0.19, true), (0.21, false)] {
+            let mut walk = followed.walks[0].clone();
+            let Some(Ok(fit)) = &mut walk.fit else { panic!("{:?}", walk.fit) };
+            fit.mirrored = Some(MirroredHeading { heading_rad: 0.0, probability });
+            fit.p_swapped = 0.0;
+            for quantity in [GaitQuantity::StepTime, GaitQuantity::KneeRange] {
+                let table = walk.gait_parameters();
+                let mut sides = table.iter().filter(|p| p.quantity == quantity && p.side.is_some());
+                assert!(sides.all(|p| p.value.is_some() == is_told), "{quantity:?} at {probability}");
+            }
         }
     }
 }

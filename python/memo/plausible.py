@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from memo._memo import CameraTilt, Walk
 
 __all__ = [
+    "LIKELY_MISTAKEN",
     "assumed_height_sentences",
     "beside_sentences",
     "contradiction_sentences",
@@ -19,6 +20,9 @@ __all__ = [
     "running_sentences",
     "tilt_sentences",
 ]
+
+LIKELY_MISTAKEN = 0.2
+"""A mistake that is likelier is reported, and nothing that depends on it (as in `memo_core::track`)."""
 
 #: A camera whose roll is known worse than this is not known to be level, degrees.
 _UNKNOWN_ROLL_DEG = 2.0

@@ -20,6 +20,7 @@ from memo.left_out import LeftOut, left_out_sentences, over_ground
 from memo.notebook import table
 from memo.pixels import camera_of_video, columns_of_video, of_video
 from memo.plausible import (
+    LIKELY_MISTAKEN,
     assumed_height_sentences,
     beside_sentences,
     contradiction_sentences,
@@ -38,9 +39,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 __all__ = ["Track", "Tracker", "fit_walk", "track"]
-
-LIKELY_SWAPPED = 0.2
-"""From this probability on, check left and right before use."""
 
 _log = logging.getLogger(__name__)
 
@@ -433,12 +431,12 @@ class Track:
             told += running_sentences(walk, self._pace(walk)[0])
             told += implausible_sentences(walk)
             told += beside_sentences(walk)
-            if walk.p_swapped > LIKELY_SWAPPED:
+            if walk.p_swapped > LIKELY_MISTAKEN:
                 chance = f"probability {walk.p_swapped:.0%}"
                 told.append(f"Left and right may be swapped ({chance}): check them before use.")
             if _is_in_place(walk):
                 told += [] if unseen else symmetry_sentences(self.gait_parameters, index)
-                is_sure = walk.p_swapped <= LIKELY_SWAPPED and not is_heading_open(walk)
+                is_sure = walk.p_swapped <= LIKELY_MISTAKEN and not is_heading_open(walk)
                 told += departure_sentences(walk.departures) if is_sure else []
             whose = ""
             if len(self.walks) > 1:

@@ -6,18 +6,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from memo.plausible import LIKELY_MISTAKEN
+
 if TYPE_CHECKING:
     from memo._memo import Walk
 
 __all__ = ["is_heading_open", "treadmill_figures", "treadmill_sentence"]
 
-LIKELY_HEADING = 0.2
-"""From this probability on, the other heading is reported in the sentence, and nothing that depends on it."""
-
 
 def is_heading_open(walk: Walk) -> bool:
     """True if a walk on a treadmill may well have the other heading that looks alike."""
-    return walk.treadmill is not None and (walk.treadmill.p_other_heading or 0) >= LIKELY_HEADING
+    return walk.treadmill is not None and (walk.treadmill.p_other_heading or 0) > LIKELY_MISTAKEN
 
 
 def treadmill_figures(walk: Walk) -> dict[str, Any]:

@@ -16,6 +16,7 @@ from memo.compare import (
     difference_sentences,
     parameter_differences,
 )
+from memo.plausible import LIKELY_MISTAKEN
 from memo.report import normative
 from memo.report.cycles import drawn_cycles
 from memo.report.page import Page, number, rows_table, text
@@ -25,7 +26,6 @@ from memo.wording import counted
 
 __all__ = ["comparison_page"]
 
-_LIKELY_SWAPPED = 0.2
 _NO_DIFFERENCE = "no difference can be told"
 
 
@@ -43,7 +43,7 @@ def comparison_page(
     parameters = parameter_differences(runs[0].parameters, runs[1].parameters, chosen)
     curves = curve_differences(runs[0].cycles, runs[1].cycles, chosen)
     are_sides_sure = all(
-        _p_swapped(run, walk) <= _LIKELY_SWAPPED for run, walk in zip(runs, chosen, strict=True)
+        _p_swapped(run, walk) <= LIKELY_MISTAKEN for run, walk in zip(runs, chosen, strict=True)
     )
     sentences = difference_sentences(("A", "B"), parameters, curves if are_sides_sure else [])
     notes = [note for run, walk in zip(runs, chosen, strict=True) for note in _doubts(run, walk)]
@@ -98,7 +98,7 @@ def _doubts(run: RunFolder, walk: int) -> list[str]:
     verdict = run.verdict(walk)
     if verdict not in (None, "well", "not measured"):
         told.append(f"{_name(run, walk)}: the model fits the person {verdict}; check its overlay before use.")
-    if p_swapped > _LIKELY_SWAPPED:
+    if p_swapped > LIKELY_MISTAKEN:
         told.append(f"{_name(run, walk)}: left and right may be swapped (probability {p_swapped:.0%}).")
     if not (run.cycles["walk"] == walk).any():
         told.append(f"{_name(run, walk)}: it has no measured gait cycles.")

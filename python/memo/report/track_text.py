@@ -9,6 +9,7 @@ import numpy as np
 
 import memo
 from memo.gait import DEFINITIONS, GAIT_COLUMNS, cadence_sentences
+from memo.plausible import LIKELY_MISTAKEN
 from memo.report import normative
 from memo.report.cycles import none_sentence
 from memo.report.page import UNKNOWN, number, rows_table, text
@@ -19,7 +20,6 @@ from memo.wording import counted
 __all__ = ["digits_of", "measured", "track_text"]
 
 _DEEPEST = 4
-_LIKELY_SWAPPED = 0.2
 _MOST_SENTENCES = 8
 _MOST_TABLES = 3
 
@@ -59,7 +59,7 @@ def _status(run: RunFolder) -> tuple[str, str]:
         told = f"{told}, interrupted"
     if not run.frames:
         return told, "bad"
-    doubtful = any(p_swapped > _LIKELY_SWAPPED for _, p_swapped in _swapped(run)) or _unsteady(run)
+    doubtful = any(p_swapped > LIKELY_MISTAKEN for _, p_swapped in _swapped(run)) or _unsteady(run)
     walks = dict.fromkeys(run.columns["walk"].tolist())
     doubtful = doubtful or any(run.verdict(walk) not in (None, "well") for walk in walks)
     return told, "fair" if doubtful or told != "tracked" else "good"
@@ -103,7 +103,7 @@ def _warnings(run: RunFolder, notes: list[str]) -> str:
     if run.run.get("interrupted"):
         count = counted(run.run["frames_read"], "frame")
         told.append(f"The run was interrupted after {count}: later frames were not read.")
-    swapped = {walk: p_swapped for walk, p_swapped in _swapped(run) if p_swapped > _LIKELY_SWAPPED}
+    swapped = {walk: p_swapped for walk, p_swapped in _swapped(run) if p_swapped > LIKELY_MISTAKEN}
     if swapped and (not run.run or len(_sentences(run)) > _MOST_SENTENCES):  # else visible sentences state it
         up_to = "up to " * (len(swapped) > 1)
         told.append(

@@ -102,6 +102,11 @@ impl TrackerOptions {
         Self { height_m: Some(height_m), ..Self::default() }
     }
 
+    /// Somebody beside a followed person is soon hidden or mistaken for that person, so half as many frames must do.
+    pub(super) fn start_frames_beside_others(&self) -> usize {
+        self.start_frames.div_ceil(2)
+    }
+
     /// Refuses options outside their ranges; [`Tracker::new`](super::tracker::Tracker::new) asks it first.
     pub fn check(&self) -> Result<(), OptionError> {
         if let Some(fov_deg) = self.field_of_view_rad.map(f64::to_degrees) {

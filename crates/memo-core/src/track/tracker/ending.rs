@@ -123,8 +123,7 @@ impl Tracker {
         mut walk: TrackedWalk,
         views: &[(usize, View)],
     ) -> Result<TrackedWalk, usize> {
-        // Beside others a walk may start with as few.
-        let least = self.options.start_frames.div_ceil(2);
+        let least = self.options.start_frames_beside_others();
         loop {
             // 1. Of a second model, what goes on with the person of the first.
             let is_first = |other: &&TrackedWalk| walk.is_second_to(other, views) == Some(true);

@@ -96,12 +96,12 @@ impl Tracker {
         back.map_or_else(|| begin(self.identities.count()), Ok)
     }
 
-    /// Somebody beside a followed person is soon hidden or mistaken for that person, so half as many frames must do.
     fn frames_to_start(&self, candidate: &Candidate) -> usize {
-        let all = self.options.start_frames;
+        let options = &self.options;
         let is_beside =
             |active: &Active| active.as_followed().is_some_and(|followed| candidate.is_in(&followed.window));
-        if self.people.iter().any(is_beside) { all.div_ceil(2) } else { all }
+        let is_beside_others = self.people.iter().any(is_beside);
+        if is_beside_others { options.start_frames_beside_others() } else { options.start_frames }
     }
 
     /// False if somebody is followed where a walk would start: on the ground or, as far as distances are known badly, in

@@ -41,7 +41,7 @@ impl Problem<'_> {
             sole_m: self.is_scale_seen.then(|| self.mean_sole_m(&fitted.unknowns)),
             crown_off: self.crown_off(&fitted.unknowns),
             cost: seen.cost,
-            total_cost: self.total_cost(&fitted.unknowns, seen),
+            total_cost: self.total_cost_of(fitted),
             parts: seen.parts.map(|of| {
                 let found = of.samples - of.missed;
                 (of.samples > 0.0).then(|| PartQuality {
