@@ -52,6 +52,8 @@ pub(super) struct Candidate {
     pub missed: usize,
     /// Whether a start was refused.
     pub refused: bool,
+    /// With so many frames, another start is worth looking for.
+    pub least: usize,
 }
 
 /// What a walk starts from.
@@ -104,10 +106,32 @@ impl Candidate {
         self.missed = 0;
     }
 
-    /// Drops the oldest frames after a refused start.
+    /// Waits for more frames after a refused start.
     pub fn refuse(&mut self, options: &TrackerOptions) {
         self.refused = true;
-        self.seen.drain(..(options.start_frames / 3).min(self.seen.len()));
+        self.least = self.seen.len() + options.start_frames / 3;
+    }
+
+    /// Sets aside all but so many last frames.
+    pub fn set_aside(&mut self, frames: usize) -> Vec<Seen> {
+        let newer = self.seen.split_off(self.seen.len().saturating_sub(frames));
+        std::mem::replace(&mut self.seen, newer)
+    }
+
+    /// Takes back frames that were set aside, as many as show a path; true if these are more than before.
+    pub fn with_older(&mut self, mut older: Vec<Seen>, options: &TrackerOptions) -> bool {
+        let newer = self.seen.len();
+        older.append(&mut self.seen);
+        self.seen = older;
+        let shows_path = |first: &usize| shows_path(&self.seen[*first..], options);
+        let Some(first) = (0..self.seen.len()).rev().find(shows_path) else { return false };
+        self.seen.drain(..first.min(self.seen.len() - newer));
+        self.seen.len() > newer
+    }
+
+    /// True if there are enough frames to look for a start that takes so many.
+    pub fn can_start(&self, frames: usize) -> bool {
+        self.missed == 0 && self.seen.len() >= frames.max(self.least)
     }
 
     /// Starts a walk, or says why not: things that do not move like a walker.
@@ -172,7 +196,7 @@ impl Candidate {
         height: &BodyHeight,
     ) -> Result<Started, Reason> {
         let across = self.started(sightings, given, height, Way::Across);
-        let is_long = lasts_s(sightings) >= given.options.path_s();
+        let is_long = shows_path(&self.seen, given.options);
         let oblique = is_long.then(|| self.started(sightings, given, height, Way::Oblique).ok()).flatten();
         let similarity = |started: &Started| started.start.lines.best.similarity;
         match (across, oblique) {
@@ -242,9 +266,11 @@ enum Way {
     Oblique,
 }
 
-/// Time from the first sighting to the last, seconds.
-fn lasts_s(sightings: &[Sighting]) -> f64 {
-    sightings.first().zip(sightings.last()).map_or(0.0, |(first, last)| last.time_s - first.time_s)
+/// True if frames are so many or last so long that an oblique path can be looked for.
+fn shows_path(seen: &[Seen], options: &TrackerOptions) -> bool {
+    let time_s = |seen: &Seen| seen.edges.time_s;
+    let lasts_s = seen.first().zip(seen.last()).map_or(0.0, |(first, last)| time_s(last) - time_s(first));
+    seen.len() >= options.path_frames || lasts_s >= options.path_s()
 }
 
 /// The course of a candidate as somebody of one gait.
@@ -546,6 +572,45 @@ pub(super) mod tests {
         let mut refused = newcomer();
         refused.refuse(&TrackerOptions::default());
         assert!(!refused.is_newcomer(&body));
+    }
+
+    /// After a refused start, the next one has the latest frames and, once they show a path, the older ones too.
+    #[test]
+    fn frames_of_a_refused_start_are_kept_for_an_oblique_one() {
+        let options = TrackerOptions::default();
+        let seen = seen_along(&PATH, &walker(), 1.2, 60, 0.04);
+        let mut candidate = Candidate::default();
+        let (mut starts, mut paths) = (Vec::new(), Vec::new());
+        for seen in seen {
+            let frame = seen.edges.frame;
+            candidate.add(seen);
+            if !candidate.can_start(options.start_frames) {
+                continue;
+            }
+            let older = candidate.set_aside(options.start_frames);
+            assert_eq!((candidate.seen.len(), candidate.seen[12].edges.frame), (13, frame));
+            starts.push(frame);
+            if candidate.with_older(older, &options) {
+                assert_eq!(candidate.seen.len(), options.path_frames);
+                paths.push(frame);
+            }
+            let frames: Vec<usize> = candidate.seen.iter().map(|seen| seen.edges.frame).collect();
+            let last = (frame + 1 - frames.len()..=frame).collect::<Vec<_>>();
+            assert_eq!(frames, last, "none twice and none missing");
+            candidate.refuse(&options);
+        }
+        assert_eq!(starts, (0..12).map(|k| 12 + 4 * k).collect::<Vec<_>>());
+        assert_eq!(paths, [40, 44, 48, 52, 56]);
+    }
+
+    /// At 7 frames per second, 13 frames last long enough for a path, so no others are needed.
+    #[test]
+    fn frames_that_show_a_path_need_no_older_ones() {
+        let options = TrackerOptions::default();
+        let mut candidate =
+            Candidate { seen: seen_along(&PATH, &walker(), 1.2, 17, 0.14), ..Candidate::default() };
+        let older = candidate.set_aside(13);
+        assert!(!candidate.with_older(older, &options) && candidate.seen.len() == 13);
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! The tracker: frames in, walks out (Rohr 1994, Fig. 3).
 //!
 //! 1. It looks for moving regions that could be people and that nobody explains who is followed already (`seeking`).
-//! 2. It starts on 13 frames of such a region ([`TrackerOptions::start_frames`], `starting`).
+//! 2. It starts on 13 frames of such a region ([`TrackerOptions::start_frames`], `starting`), or on more if these show no walk.
 //! 3. It follows both half-cycle twins with filters (`following`). Nearer people hide farther ones (`crowd`).
 //! 4. It looks for an oblique path once [`TrackerOptions::path_frames`] frames are followed, or for as long at a low frame
 //!    rate, and for turns from then on (`bend`).

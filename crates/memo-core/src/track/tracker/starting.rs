@@ -18,13 +18,22 @@ impl Tracker {
     pub(super) fn start(&mut self, evidence: &Evidence) {
         let size = [evidence.grey.width() as u32, evidence.grey.height() as u32];
         for mut candidate in std::mem::take(&mut self.candidates) {
-            if candidate.seen.len() < self.frames_to_start(&candidate) || candidate.missed > 0 {
+            let frames = self.frames_to_start(&candidate);
+            if !candidate.can_start(frames) {
                 self.candidates.push(candidate);
                 continue;
             }
             let order = self.order_of_heights.clone();
+            let older = candidate.set_aside(frames);
             self.order_heights(&candidate);
-            let begun = self.begun(&candidate, size).and_then(|active| {
+            let begun = self.begun(&candidate, size);
+            let begun = match begun {
+                Err(reason) if candidate.with_older(older, &self.options) => {
+                    self.begun(&candidate, size).map_err(|_| reason)
+                }
+                begun => begun,
+            };
+            let begun = begun.and_then(|active| {
                 let is_own = self.is_somebody_else(&active) && !self.is_left_over(&active);
                 if is_own { Ok(active) } else { Err(Reason::Beside) }
             });

@@ -199,11 +199,8 @@ fn the_report_counts_frames_candidates_borders_and_refused_starts() {
     tracker.candidates.clear();
     (10..23).for_each(|k| tracker.advance(&evidence(k, &[person(400)])).unwrap());
     assert_eq!(tracker.seek_report().refused_starts, 1);
-    assert_eq!(
-        tracker.candidates.iter().map(|c| c.seen.len()).max().unwrap_or(0),
-        13 - 4,
-        "the oldest third is dropped"
-    );
+    let seen = tracker.candidates.iter().map(|c| (c.seen.len(), c.least)).max();
+    assert_eq!(seen, Some((13, 13 + 4)), "another start after a third as many frames");
     let frame = Image::filled(SIZE[0], SIZE[1], 100u8);
     (0..3).for_each(|k| tracker.update(&frame.as_frame(), f64::from(k)).unwrap());
     assert_eq!(tracker.seek_report().frames, 3);
@@ -214,7 +211,8 @@ fn sightings_do_not_pile_up_while_nobody_starts() {
     let mut tracker = tracker();
     for k in 0..120 {
         tracker.advance(&evidence(k, &[person(400)])).unwrap();
-        assert!(tracker.candidates.iter().map(|c| c.seen.len()).max().unwrap_or(0) < options().start_frames);
+        let most = options().path_frames + options().start_frames / 3;
+        assert!(tracker.candidates.iter().all(|c| c.seen.len() < most));
     }
     assert!(tracker.people.is_empty() && tracker.seek_report().refused_starts > 20);
 }
