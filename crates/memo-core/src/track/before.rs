@@ -6,25 +6,21 @@
 //! 1. What the regions of the frames before the start showed was kept. Nearer people who were not followed then either stand
 //!    in front where their first steps lead.
 //! 2. From the start backwards, the person is searched in each near where the first steps lead, as long as the contours are
-//!    about as similar as in the walk and others do not hide most of the person: straight on and, where the regions were the
-//!    person's alone and turn clearly, around the bend that they show.
-//! 3. From the earliest of these frames on, all are followed again, on the one of the two with the more similar contours.
+//!    about as similar as in the walk and others do not hide most of the person.
+//! 3. From the earliest of these frames on, all are followed again.
 
 use super::active::Active;
 use super::candidate::{MISSED_FRAMES, Seen};
 use super::crowd::{Expected, body_box, expected, keep_unowned};
-use super::decisions::{CLEAR_TURN, DECIDING_SHARE, LOST_SHARE, TURN_GAIN};
+use super::decisions::{DECIDING_SHARE, LOST_SHARE};
 use super::fit::views::Piece;
-use super::locate::{Sighting, same_person};
 use super::options::TrackerOptions;
-use super::route::Route;
 use super::search::{Axis, Grid, Hypothesis, PHASE_STEP, POSITION_STEP_M, Scene, search_peak};
-use super::trail::Trail;
+use super::standing::Standing;
 use super::walk::{Beginning, FrameEdges, State, Step, Walk};
 use crate::estimate::line::line_through;
 use crate::model::{Camera, Others};
 use std::collections::HashMap;
-use std::sync::Arc;
 
 /// So much of what a frame's place and phase are off is expected in the frame before.
 const DRIFT: f64 = 0.5;
@@ -43,18 +39,6 @@ struct Found {
     visible: f32,
 }
 
-/// A walk with frames before it.
-struct Preceded {
-    walk: Walk,
-    added: Vec<Seen>,
-}
-
-impl Preceded {
-    fn similarity(&self) -> f64 {
-        similarity(self.walk.steps())
-    }
-}
-
 /// Where the first steps of a walk lead.
 struct Lead {
     speed_mps: f64,
@@ -66,7 +50,7 @@ struct Lead {
 
 impl Lead {
     fn of(steps: &[Step], options: &TrackerOptions) -> Self {
-        let first = first_steps(steps, options);
+        let first = &steps[..steps.len().min(2 * options.start_frames)];
         let line = |of: fn(&State) -> f64| {
             line_through(&first.iter().map(|step| (step.time_s, of(&step.state))).collect::<Vec<_>>())
         };
@@ -126,56 +110,26 @@ impl Active {
     pub(super) fn begin_before(&mut self, beside: &[Beside<'_>], options: &TrackerOptions) {
         let before = std::mem::take(&mut self.before);
         let is_whole = self.kept.len() == self.steps().len();
-        let is_by_feet = first_steps(self.steps(), options).iter().any(|step| step.by_feet);
-        if before.is_empty() || self.is_on_treadmill || is_by_feet || !is_whole {
+        if before.is_empty() || self.is_on_treadmill || self.frontal.is_some() || !is_whole {
             return;
         }
-        // 1. Straight on from the first steps backwards, and around a bend that rectangles show.
-        let straight = self.preceded(&self.walk.route, beside, &before, options);
-        let alone = self.alone_before(&before);
-        let bend = self.bend_before(&alone, options);
-        let bent = bend.and_then(|route| self.preceded(&route, beside, &before, options));
-        // 2. The one on which more is similar.
-        let total = |preceded: &Option<Preceded>| preceded.as_ref().map_or(0.0, Preceded::similarity);
-        let is_bent = total(&bent) > (1.0 + TURN_GAIN) * total(&straight);
-        let Some(Preceded { walk, added }) = (if is_bent { bent } else { straight }) else { return };
-        self.walk = walk;
-        let first = added.first().map_or(0, |seen| seen.edges.frame);
-        let feet = std::mem::take(&mut self.earlier).feet;
-        self.feet.extend(feet.into_iter().filter(|(frame, _)| *frame >= first));
-        let is_alone = |seen: &Seen| is_bent && alone.iter().any(|alone| alone.sighting == seen.sighting);
-        let sighting = |seen: &Seen| is_alone(seen).then_some(seen.sighting);
-        self.kept.splice(0..0, added.iter().map(|seen| (sighting(seen), seen.edges.clone())));
-        // The crown of a region may be somebody else's.
-        let pieces = added.iter().filter_map(|seen| Some(Piece { crown_px: None, ..seen.piece.clone()? }));
-        self.pieces.splice(0..0, pieces.collect::<Vec<_>>());
-        self.pace_again(options);
-    }
-
-    /// The walk on a route from the earliest of the frames before it that show the person there; `None` if there are none, or
-    /// if its own frames become less similar.
-    fn preceded(
-        &self,
-        route: &Route,
-        beside: &[Beside<'_>],
-        before: &[Arc<Seen>],
-        options: &TrackerOptions,
-    ) -> Option<Preceded> {
         // 1. Where the first steps lead, and who stands in front there.
         let lead = Lead::of(self.steps(), options);
-        let before: Vec<Seen> = before.iter().map(|seen| self.behind(route, beside, &lead, seen)).collect();
-        let least = LOST_SHARE * similarity(self.steps()) / self.steps().len() as f64;
+        let before: Vec<Seen> = before.iter().map(|seen| self.behind(beside, &lead, seen)).collect();
+        let sum = |walk: &Walk, from: usize| -> f64 {
+            walk.steps()[from..].iter().map(|step| f64::from(step.similarity * step.visible)).sum()
+        };
+        let least = LOST_SHARE * sum(&self.walk, 0) / self.steps().len() as f64;
         // 2. The frames that show the person there, the latest first.
         let [mut along_off, mut phase_off] = [0.0; 2];
-        let mut added: Vec<Seen> = Vec::new();
+        let mut added: Vec<&Seen> = Vec::new();
         let mut beginning = None;
         let mut missed = 0;
         for regions in before.chunk_by(|a, b| a.edges.frame == b.edges.frame).rev() {
             let time_s = regions[0].edges.time_s;
             let at = lead.at(time_s);
             let led = Hypothesis { along_m: at.along_m + along_off, phase: at.phase + phase_off, ..at };
-            let found =
-                regions.iter().filter_map(|seen| Some((seen, self.similar(route, &led, seen, options)?)));
+            let found = regions.iter().filter_map(|seen| Some((seen, self.similar(&led, seen, options)?)));
             let most = found.max_by(|(_, a), (_, b)| a.similarity.total_cmp(&b.similarity));
             let shows = |found: &Found| found.similarity >= least && found.visible >= DECIDING_SHARE;
             let Some((seen, Found { best, .. })) = most.filter(|(_, found)| shows(found)) else {
@@ -189,7 +143,7 @@ impl Active {
             along_off += DRIFT * (best.along_m - led.along_m);
             phase_off += DRIFT * (cycles - cycles.round());
             missed = 0;
-            added.push(seen.clone());
+            added.push(seen);
             beginning = Some(Beginning {
                 time_s,
                 along_m: led.along_m,
@@ -198,51 +152,21 @@ impl Active {
                 rate_hz: lead.rate_hz,
             });
         }
+        let Some(beginning) = beginning else { return };
         added.reverse();
         // 3. All frames from there on.
         let frames = added.iter().map(|seen| &seen.edges).chain(self.kept.iter().map(|(_, edges)| edges));
-        let walk = Walk::new(self.walk.walker.clone(), route.clone(), beginning?);
+        let walk = Walk::new(self.walk.walker.clone(), self.walk.route.clone(), beginning);
         let walk = walk.through(frames, &self.camera, &options.walk);
-        let own = similarity(&walk.steps()[added.len()..]);
-        (own >= (1.0 - MOST_LOST) * similarity(self.steps())).then_some(Preceded { walk, added })
-    }
-
-    /// The regions of the frames before that are the person's alone, back to where there is none.
-    fn alone_before(&self, before: &[Arc<Seen>]) -> Vec<Arc<Seen>> {
-        let mut alone: Vec<Arc<Seen>> = Vec::new();
-        let first = self.kept.iter().find_map(|(sighting, _)| *sighting);
-        let mut last = first.map(|sighting| sighting.rectangle);
-        let mut missed = 0;
-        for regions in before.chunk_by(|a, b| a.edges.frame == b.edges.frame).rev() {
-            let overlap = |seen: &Seen| {
-                let rectangle = &seen.sighting.rectangle;
-                let last = last.filter(|last| !seen.edges.shared && same_person(last, rectangle))?;
-                Some(last.sides(0.0).overlap(&rectangle.sides(0.0)))
-            };
-            let own = regions.iter().filter_map(|seen| Some((seen, overlap(seen)?)));
-            let Some((seen, _)) = own.max_by(|a, b| a.1.total_cmp(&b.1)) else {
-                missed += 1;
-                if missed > MISSED_FRAMES {
-                    break;
-                }
-                continue;
-            };
-            missed = 0;
-            last = Some(seen.sighting.rectangle);
-            alone.push(seen.clone());
+        if sum(&walk, added.len()) < (1.0 - MOST_LOST) * sum(&self.walk, 0) {
+            return;
         }
-        alone.reverse();
-        alone
-    }
-
-    /// The route that leads from these regions to the walk, if they and the first steps turn clearly.
-    fn bend_before(&self, alone: &[Arc<Seen>], options: &TrackerOptions) -> Option<Route> {
-        let mut sightings: Vec<Sighting> = alone.iter().map(|seen| seen.sighting).collect();
-        let (route, _) = self.route_from(&sightings, &[])?;
-        let first = &self.kept[..first_steps(self.steps(), options).len()];
-        sightings.extend(first.iter().filter_map(|(sighting, _)| *sighting));
-        let trail = Trail::new(self.rows, &[], &sightings, &self.camera, &self.crown());
-        (trail.turn_gain() > CLEAR_TURN).then_some(route)
+        self.walk = walk;
+        self.earlier = Standing::default();
+        self.kept.splice(0..0, added.iter().map(|seen| (None, seen.edges.clone())));
+        // The crown of a region may be somebody else's.
+        let pieces = added.iter().filter_map(|seen| Some(Piece { crown_px: None, ..seen.piece.clone()? }));
+        self.pieces.splice(0..0, pieces.collect::<Vec<_>>());
     }
 
     /// Adds the people behind this one to what the frames of the walk show: before them, an outline borders on no empty scene,
@@ -270,8 +194,8 @@ impl Active {
     }
 
     /// What a region showed, with the people who stand in front of this one there.
-    fn behind(&self, route: &Route, beside: &[Beside<'_>], lead: &Lead, seen: &Seen) -> Seen {
-        let path = route.at(lead.at(seen.edges.time_s).along_m);
+    fn behind(&self, beside: &[Beside<'_>], lead: &Lead, seen: &Seen) -> Seen {
+        let path = self.walk.route.at(lead.at(seen.edges.time_s).along_m);
         let scene = Scene::new(&self.walk.walker, &self.camera, &path);
         let centre = scene.pose(&lead.at(seen.edges.time_s)).torso_centre;
         let distance_m = centre.distance(self.camera.position());
@@ -287,16 +211,10 @@ impl Active {
     }
 
     /// The most similar hypothesis near one; `None` if the edges of the body were not searched.
-    fn similar(
-        &self,
-        route: &Route,
-        near: &Hypothesis,
-        seen: &Seen,
-        options: &TrackerOptions,
-    ) -> Option<Found> {
+    fn similar(&self, near: &Hypothesis, seen: &Seen, options: &TrackerOptions) -> Option<Found> {
         let near = Hypothesis { phase: near.phase.rem_euclid(1.0), ..*near };
         let others = Others::new(&seen.edges.others, self.camera.position());
-        let path = route.at(near.along_m);
+        let path = self.walk.route.at(near.along_m);
         let scene = Scene::new(&self.walk.walker, &self.camera, &path).among(&others);
         let body = body_box(&self.camera, &scene.pose(&near).cylinders)?;
         let window = seen.edges.window.sides(0.0);
@@ -318,38 +236,22 @@ impl Active {
     }
 }
 
-/// The steps that show where the person came from.
-fn first_steps<'a>(steps: &'a [Step], options: &TrackerOptions) -> &'a [Step] {
-    &steps[..steps.len().min(2 * options.start_frames)]
-}
-
-/// Similarity times the visible share, over all steps.
-fn similarity(steps: &[Step]) -> f64 {
-    steps.iter().map(|step| f64::from(step.similarity * step.visible)).sum()
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::active::tests::{BEGINNING, PATH, active, frames_on, options};
     use super::super::search::Path;
-    use super::super::trail::tests::arc;
     use super::*;
     use crate::image::Image;
     use glam::DVec2;
+    use std::sync::Arc;
 
     const FRAME_S: f64 = 0.05;
     const FIRST: usize = 20;
-
-    type Frame = (Option<Sighting>, FrameEdges);
 
     /// A walk along a path that is followed from the frame `FIRST` on, and what was seen before.
     fn begun() -> Active {
         let mut frames = frames_on(60, FRAME_S, &PATH.into(), &PATH.into());
         let kept = frames.split_off(FIRST);
-        begun_on(PATH, frames, kept)
-    }
-
-    fn begun_on(path: Path, frames: Vec<Frame>, kept: Vec<Frame>) -> Active {
         let mut active = active(Vec::new());
         let time_s = kept[0].1.time_s;
         let beginning = Beginning {
@@ -358,10 +260,14 @@ mod tests {
             phase: BEGINNING.phase + BEGINNING.rate_hz * time_s,
             ..BEGINNING
         };
-        let walk = Walk::new(active.walk.walker.clone(), path, beginning);
+        let walk = Walk::new(active.walk.walker.clone(), PATH, beginning);
         active.walk = walk.through(kept.iter().map(|(_, edges)| edges), &active.camera, &options().walk);
         active.kept = kept;
-        let seen = |(sighting, edges): Frame| Seen { sighting: sighting.unwrap(), edges, piece: None };
+        let seen = |(sighting, edges): (Option<_>, FrameEdges)| Seen {
+            sighting: sighting.unwrap(),
+            edges,
+            piece: None,
+        };
         active.before = frames.into_iter().map(|frame| Arc::new(seen(frame))).collect();
         active
     }
@@ -403,45 +309,6 @@ mod tests {
         let mut lost = begun();
         without(&mut lost, 8..9 + MISSED_FRAMES);
         assert_eq!(first_frame(lost), 9 + MISSED_FRAMES);
-    }
-
-    /// The walk starts where an arc ends, on which the rectangles and the contours of the frames before are.
-    #[test]
-    fn a_walk_begins_around_the_bend_that_its_rectangles_show() {
-        const FIRST: usize = 36;
-        let bend = arc(1.6);
-        let end_m = BEGINNING.along_m + BEGINNING.speed_mps * FRAME_S * FIRST as f64;
-        let points = |k: usize| bend.at(end_m).point(end_m + 0.05 * k as f64, 0.0).truncate();
-        let around = bend.continued(&(0..40).map(points).collect::<Vec<_>>(), end_m).unwrap();
-        let started = |rectangles: &Route| {
-            let mut frames = frames_on(60, FRAME_S, &around, rectangles);
-            let kept = frames.split_off(FIRST);
-            begun_on(around.at(end_m), frames, kept)
-        };
-        let mut turned = started(&around);
-        turned.begin_before(&[], &options());
-        assert_eq!((turned.steps()[0].frame, turned.kept[0].0.is_some()), (0, true));
-        for step in turned.steps() {
-            let along_m = BEGINNING.along_m + BEGINNING.speed_mps * step.time_s;
-            let place = turned.walk.route.place(step.state.along.position);
-            assert!(place.distance(around.place(along_m)) < 0.15, "{}", step.frame);
-        }
-        // A smooth curve turns little at its ends.
-        for step in &turned.steps()[10..] {
-            let at = around.at(BEGINNING.along_m + BEGINNING.speed_mps * step.time_s);
-            let path = turned.walk.route.at(step.state.along.position);
-            assert!((path.heading_rad - at.heading_rad).abs() < 0.2, "{}", step.frame);
-        }
-        // Somebody else beside, from whom the rectangles are not told.
-        let mut beside = started(&around);
-        beside.before.iter_mut().for_each(|seen| Arc::make_mut(seen).edges.shared = true);
-        assert!(beside.alone_before(&beside.before).is_empty());
-        beside.begin_before(&[], &options());
-        assert!(beside.walk.route.is_straight());
-        // Where they go straight on, so does the walk.
-        let mut straight = begun();
-        straight.begin_before(&[], &options());
-        assert!(straight.walk.route.is_straight());
     }
 
     /// Of several regions in a frame, the one with the person counts; a window that cuts the body shows too little.

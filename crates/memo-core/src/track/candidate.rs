@@ -421,7 +421,7 @@ pub(super) mod tests {
         seen_along(&PATH, walker, speed_mps, 5, 0.1)
     }
 
-    fn seen_along(path: &Path, walker: &Walker, speed_mps: f64, count: usize, frame_s: f64) -> Vec<Seen> {
+    pub fn seen_along(path: &Path, walker: &Walker, speed_mps: f64, count: usize, frame_s: f64) -> Vec<Seen> {
         let camera = camera();
         let scene = Scene::new(walker, &camera, path);
         let crown_m = walker.level_crown_height_m();

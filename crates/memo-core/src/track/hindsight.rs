@@ -27,13 +27,12 @@ const AT_ONCE: usize = 5;
 impl Active {
     /// Begins the walk with the frames before it, if their feet fit its steps better than even motion.
     pub(super) fn begin_earlier(&mut self, options: &TrackerOptions) {
-        let earlier = &self.earlier;
+        let earlier = std::mem::take(&mut self.earlier);
         let is_whole = self.kept.len() == self.steps().len();
         if options.camera.is_none() || self.is_on_treadmill || self.is_frontal() || !is_whole {
             return;
         }
-        let times_s: Vec<f64> = earlier.kept.iter().map(|(_, edges)| edges.time_s).collect();
-        let Some((route, places)) = self.route_from(&earlier.sightings(), &times_s) else { return };
+        let Some((route, places)) = self.route_from(&earlier) else { return };
         let mut frontal = self.recorded().moved_to(&route);
         let before: Vec<_> = earlier.kept.iter().zip(places).rev().collect();
         for some in before.chunks(AT_ONCE) {
@@ -48,8 +47,7 @@ impl Active {
         if !walks(&mut frontal, 0..before.len()) {
             return;
         }
-        let Standing { kept, pieces, feet } = std::mem::take(&mut self.earlier);
-        self.before.clear();
+        let Standing { kept, pieces, feet } = earlier;
         self.kept.splice(0..0, kept);
         self.pieces.splice(0..0, pieces);
         self.feet.extend(feet);
@@ -125,8 +123,8 @@ impl Active {
         Some(joined)
     }
 
-    /// The route with the curve of earlier rectangles before it, and the places on it at some times; `None` without any.
-    pub(super) fn route_from(&self, earlier: &[Sighting], times_s: &[f64]) -> Option<(Route, Vec<DVec2>)> {
+    /// The route with the curve of the earlier rectangles before it, and their places on it; `None` without any.
+    fn route_from(&self, earlier: &Standing) -> Option<(Route, Vec<DVec2>)> {
         let steps = self.steps();
         let ends_m = [steps.first()?, steps.last()?].map(|step| step.state.along.position);
         // 1. The curve of what came before, from the walk backwards in time.
@@ -136,26 +134,26 @@ impl Active {
         };
         let anchors: Vec<Anchor> = (0..ANCHORS.min(steps.len())).rev().map(anchor).collect();
         let backwards: Vec<Sighting> =
-            earlier.iter().rev().map(|s| Sighting { time_s: -s.time_s, ..*s }).collect();
+            earlier.sightings().iter().rev().map(|s| Sighting { time_s: -s.time_s, ..*s }).collect();
         let trail = Trail::new(self.rows, &anchors, &backwards, &self.camera, &self.crown());
         let mut way: Vec<DVec2> = trail.curve(JERK_SD)[anchors.len()..].iter().rev().copied().collect();
-        let seen_s: Vec<f64> = trail.times_s()[anchors.len()..].iter().rev().map(|time_s| -time_s).collect();
-        if seen_s.len() < 2 {
+        let times_s: Vec<f64> = trail.times_s()[anchors.len()..].iter().rev().map(|time_s| -time_s).collect();
+        if times_s.len() < 2 {
             return None;
         }
         // 2. The places of frames without a rectangle are between those of others.
         let at = |time_s: f64| {
-            let after = seen_s.partition_point(|&t| t < time_s).clamp(1, seen_s.len() - 1);
-            let t = (time_s - seen_s[after - 1]) / (seen_s[after] - seen_s[after - 1]);
+            let after = times_s.partition_point(|&t| t < time_s).clamp(1, times_s.len() - 1);
+            let t = (time_s - times_s[after - 1]) / (times_s[after] - times_s[after - 1]);
             way[after - 1].lerp(way[after], t)
         };
-        let places = times_s.iter().map(|&time_s| at(time_s)).collect();
+        let places = earlier.kept.iter().map(|(_, edges)| at(edges.time_s)).collect();
         // 3. The walk's own route from its first place on.
         let length_m = ends_m[1] - ends_m[0];
         let count = (length_m / POINTS_M).max(2.0) as usize;
         let own = |k: usize| self.walk.route.place(ends_m[0] + length_m * k as f64 / count as f64);
         way.extend((0..=count).map(own));
-        let before_m: f64 = way[..=seen_s.len()].windows(2).map(|pair| pair[0].distance(pair[1])).sum();
+        let before_m: f64 = way[..=times_s.len()].windows(2).map(|pair| pair[0].distance(pair[1])).sum();
         Some((Route::through(&way, ends_m[0] - before_m)?, places))
     }
 }

@@ -162,14 +162,8 @@ impl Tracker {
         active.settle(&self.backdrop, &self.options);
         // On a smoothed route, the feet would walk on.
         let standing = active.standing();
-        // Where feet were followed, those before tell first.
-        if active.frontal.is_some() {
-            active.begin_earlier(&self.options);
-            active.begin_before(&self.beside(), &self.options);
-        } else {
-            active.begin_before(&self.beside(), &self.options);
-            active.begin_earlier(&self.options);
-        }
+        active.begin_before(&self.beside(), &self.options);
+        active.begin_earlier(&self.options);
         active.turned(&self.options);
         active.pace_all();
         active.straighten(&self.options.walk);

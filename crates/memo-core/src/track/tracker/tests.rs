@@ -1,7 +1,7 @@
 //! Decisions of the tracker, on moving boxes and on walks put into it; no frame is drawn.
 
 use super::super::active::tests::active;
-use super::super::candidate::tests::seen_walking;
+use super::super::candidate::tests::{seen_along, seen_walking};
 use super::super::crowd::{body_box, clear_explained};
 use super::super::frontal::tests::{MIDDLE, SPEED_MPS, feet_of_steps, standing, towards};
 use super::super::height::BodyHeight;
@@ -57,6 +57,24 @@ fn evidence(frame: usize, boxes: &[Rectangle]) -> Evidence {
 /// A box that could be a person of 200 px.
 fn person(left: usize) -> Rectangle {
     boxed(left, 399, 80, 200)
+}
+
+/// The contours of the latest 13 frames show nobody who walks; those of 40 do, obliquely.
+#[test]
+fn who_is_refused_on_13_frames_starts_on_40() {
+    let path = Path { heading_rad: 0.8, origin: DVec2::ZERO };
+    let mut seen = seen_along(&path, &walker(), 1.2, 40, 0.04);
+    seen[27..].iter_mut().for_each(|seen| seen.edges.edges.clear());
+    for (first, count) in [(1, 0), (0, 1)] {
+        let mut tracker = tracker();
+        tracker.candidates = vec![Candidate { seen: seen[first..].to_vec(), ..Candidate::default() }];
+        tracker.start(&evidence(39, &[]));
+        assert_eq!(tracker.people.len(), count);
+        for active in &tracker.people {
+            let off_rad = active.start.path.heading_rad - path.heading_rad;
+            assert!(off_rad.abs() < 0.15 && active.kept.len() == 40, "{off_rad}");
+        }
+    }
 }
 
 /// The number of sightings kept after frames with a person (true) and without.
