@@ -32,6 +32,8 @@ const GLANCE_EVERY: usize = 3;
 /// the height of a whole person's by a few percent. Of the two drawn people behind somebody on whom it was chosen, the share
 /// was 0.81 with hidden feet and 0.89 with feet that were seen: the margin is thin.
 const WHOLE_SHARE: f64 = 0.85;
+/// A start in as many frames as show a path is looked for after so many refused ones: it takes three times as long.
+const PATH_EVERY: usize = 3;
 /// Gaits other than the average with which a walk can start.
 const OTHER_GAITS: [GaitStyle; 2] = [GaitStyle::CROUCHED, GaitStyle::SHORT_STEPS];
 
@@ -50,8 +52,8 @@ pub(super) struct Candidate {
     pub seen: Vec<Seen>,
     /// Frames without it since the last one.
     pub missed: usize,
-    /// Whether a start was refused.
-    pub refused: bool,
+    /// How many starts were refused.
+    pub refusals: usize,
     /// With so many frames, another start is worth looking for.
     pub least: usize,
 }
@@ -98,7 +100,7 @@ impl Candidate {
     pub fn is_newcomer(&self, window: &Rectangle) -> bool {
         let least = NEWCOMER_SHARE * window.height() as f64;
         let is_large = self.last_rectangle().is_some_and(|last| last.height() as f64 >= least);
-        self.missed == 0 && !self.refused && is_large && self.is_in(window)
+        self.missed == 0 && self.refusals == 0 && is_large && self.is_in(window)
     }
 
     pub fn add(&mut self, seen: Seen) {
@@ -108,7 +110,7 @@ impl Candidate {
 
     /// Waits for more frames after a refused start.
     pub fn refuse(&mut self, options: &TrackerOptions) {
-        self.refused = true;
+        self.refusals += 1;
         self.least = self.seen.len() + options.start_frames / 3;
     }
 
@@ -118,7 +120,8 @@ impl Candidate {
         std::mem::replace(&mut self.seen, newer)
     }
 
-    /// Takes back frames that were set aside, as many as show a path; true if these are more than before.
+    /// Takes back frames that were set aside, as many as show a path; true if these are more than before and another start
+    /// should be looked for in them.
     pub fn with_older(&mut self, mut older: Vec<Seen>, options: &TrackerOptions) -> bool {
         let newer = self.seen.len();
         older.append(&mut self.seen);
@@ -126,7 +129,7 @@ impl Candidate {
         let shows_path = |first: &usize| shows_path(&self.seen[*first..], options);
         let Some(first) = (0..self.seen.len()).rev().find(shows_path) else { return false };
         self.seen.drain(..first.min(self.seen.len() - newer));
-        self.seen.len() > newer
+        self.seen.len() > newer && self.refusals % PATH_EVERY == 1
     }
 
     /// True if there are enough frames to look for a start that takes so many.
@@ -600,7 +603,7 @@ pub(super) mod tests {
             candidate.refuse(&options);
         }
         assert_eq!(starts, (0..12).map(|k| 12 + 4 * k).collect::<Vec<_>>());
-        assert_eq!(paths, [40, 44, 48, 52, 56]);
+        assert_eq!(paths, [40, 52]);
     }
 
     /// At 7 frames per second, 13 frames last long enough for a path, so no others are needed.

@@ -67,7 +67,8 @@ fn who_is_refused_on_13_frames_starts_on_40() {
     seen[27..].iter_mut().for_each(|seen| seen.edges.edges.clear());
     for (first, count) in [(1, 0), (0, 1)] {
         let mut tracker = tracker();
-        tracker.candidates = vec![Candidate { seen: seen[first..].to_vec(), ..Candidate::default() }];
+        let seen = seen[first..].to_vec();
+        tracker.candidates = vec![Candidate { seen, refusals: 1, ..Candidate::default() }];
         tracker.start(&evidence(39, &[]));
         assert_eq!(tracker.people.len(), count);
         for active in &tracker.people {
