@@ -457,7 +457,7 @@ fn a_walk_on_a_treadmill_is_recognised_and_has_its_belt_s_speed() {
                 "{quantity:?}: {low}..{high}, {truth}"
             );
         }
-        // In the other heading the steps are others, so while it is open no side is told.
+        // The length of each step depends on the heading. While the heading is open, no value is given by side.
         for (probability, is_told) in [(0.19, true), (0.21, false)] {
             let mut walk = followed.walks[0].clone();
             let Some(Ok(fit)) = &mut walk.fit else { panic!("{:?}", walk.fit) };
