@@ -9,7 +9,7 @@ use super::super::steady;
 use super::super::walk::{Step, Walk};
 use super::contacts::Contact;
 use super::edge_search::View;
-use super::problem::StartGait;
+use super::problem::{Glance, StartGait};
 use super::views::{Backdrop, Piece};
 use super::{
     FitError, FitFrame, FitOptions, FitVerdict, FittedFrame, Problem, WalkFit, fit_on_the_spot, fitted_route,
@@ -80,17 +80,23 @@ impl Tracked<'_> {
             fit
         };
         if !self.is_on_treadmill {
-            let bent = self.fit_over_ground(&route, &frames, options, p_swapped);
+            let problem = self.problem(&route, &frames, options);
+            let glance = problem.glance(0.0)?;
+            let bent = self.fit_over_ground(problem, glance.gait, p_swapped);
             // A walk goes on along its route and in its distance, so only those of a whole walk are given up; and on the ground of
             // an assumed camera a straight line may be bent, and the distance is the height's.
             let is_compared = p_swapped.is_some() && self.tilt.is_none();
             let line = is_compared.then(|| straightened(&route, &mut frames)).flatten();
             let fit = match line {
                 None => bent,
-                Some(line) => nearer(self.fit_over_ground(&line, &frames, options, p_swapped), bent),
+                Some(line) => {
+                    let problem = self.problem(&line, &frames, options);
+                    let gait = problem.glance(0.0).map(|glance| glance.gait);
+                    nearer(gait.and_then(|gait| self.fit_over_ground(problem, gait, p_swapped)), bent)
+                }
             };
             let fit = match is_compared {
-                true => self.at_another_distance(fit, &mut frames, &tracked_m, options),
+                true => self.at_another_distance(fit, glance, &mut frames, &tracked_m, options),
                 false => fit,
             };
             return Ok(with_tilt(self.with_feet(fit?)));
@@ -118,13 +124,10 @@ impl Tracked<'_> {
 
     fn fit_over_ground(
         &self,
-        route: &Route,
-        frames: &[FitFrame],
-        options: &FitOptions,
+        problem: Problem<'_>,
+        gait: StartGait,
         p_swapped: Option<f64>,
     ) -> Result<WalkFit, FitError> {
-        let problem = self.problem(route, frames, options);
-        let gait = problem.start_gait(0.0)?;
         let fit = problem.fit(gait, p_swapped)?;
         Ok(if p_swapped.is_some() { self.with_height_of_its_own(fit, problem, gait) } else { fit })
     }
@@ -132,10 +135,11 @@ impl Tracked<'_> {
     /// The fit at another distance from the camera, if it is clearly likelier, for somebody whom a fit at the tracker's distance
     /// does not fit well. The tracker keeps the distance of the first frames, where others may have hidden the feet. A fit finds
     /// the distance from starts up to about a tenth off; from farther ones it seeks the feet in the shanks or below the shoes.
-    /// `tracked_m` are the tracker's places of the frames along its route.
+    /// `glance` is that at the tracker's distance, and `tracked_m` are the tracker's places of the frames along its route.
     fn at_another_distance(
         &self,
         here: Result<WalkFit, FitError>,
+        glance: Glance,
         frames: &mut [FitFrame],
         tracked_m: &[f64],
         options: &FitOptions,
@@ -160,14 +164,14 @@ impl Tracked<'_> {
             fitted_route(self.camera, self.average, &route, ends_m, frames, options)
         };
         // 1. Where a few of the frames are likeliest.
-        let glance = |&factor: &f64| {
+        let glance_at = |&factor: &f64| {
             let route = moved(frames, factor);
-            let (gait, total_cost) = self.problem(&route, frames, options).glance(0.0).ok()?;
-            Some((factor, gait, total_cost))
+            Some((factor, self.problem(&route, frames, options).glance(0.0).ok()?))
         };
-        let glances: Vec<_> = [1.0].iter().chain(distances).filter_map(glance).collect();
-        let likeliest = glances.into_iter().min_by(|a, b| a.2.total_cmp(&b.2));
-        let Some((factor, gait, _)) = likeliest.filter(|&(factor, ..)| factor != 1.0) else { return here };
+        let glances: Vec<_> = distances.iter().filter_map(glance_at).collect();
+        let likeliest = glances.into_iter().min_by(|(_, a), (_, b)| a.total_cost.total_cmp(&b.total_cost));
+        let is_likelier = |there: &(f64, Glance)| there.1.total_cost < glance.total_cost;
+        let Some((factor, Glance { gait, .. })) = likeliest.filter(is_likelier) else { return here };
         // 2. All frames there. What the tracker said of the sides, contours said that lay elsewhere.
         let route = moved(frames, factor);
         let problem = self.problem(&route, frames, options);

@@ -122,6 +122,15 @@ impl StartGait {
     }
 }
 
+/// What a few of the frames say of a fit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Glance {
+    /// The gait from which they come nearest to their edges.
+    pub gait: StartGait,
+    /// Their [total cost](super::FitQuality::total_cost) with curves from there.
+    pub total_cost: f64,
+}
+
 /// Share of its cost by which a start from another gait than the average must be nearer to the edges once the curves are
 /// fitted. Of 43 drawn walks of people without a crouch or a stiff knee, others are nearer by at most 4 %, but by 6 % in a
 /// piece of 36 frames and by 9 and 12 % in clothes that hardly differ from the background. Of people who walk so, crouched gait
@@ -310,7 +319,7 @@ impl<'a> Problem<'a> {
 
     /// The first steps from the best gait to start from, with the tracker's phase shifted by some cycles.
     pub(super) fn best_start(&self, phase: f64) -> Result<(Unknowns, StartGait), FitError> {
-        let gait = self.start_gait(phase)?;
+        let gait = self.glance(phase)?.gait;
         let (_, start) = self.started(phase, gait).ok_or(FitError::Undetermined)?;
         Ok((start, gait))
     }
@@ -321,12 +330,7 @@ impl<'a> Problem<'a> {
     }
 
     /// The gait from which a few of the frames come nearest to their edges once the person's curves are fitted.
-    pub fn start_gait(&self, phase: f64) -> Result<StartGait, FitError> {
-        self.glance(phase).map(|(gait, _)| gait)
-    }
-
-    /// The same with the [total cost](FitQuality::total_cost) of these frames with their curves.
-    pub fn glance(&self, phase: f64) -> Result<(StartGait, f64), FitError> {
+    pub fn glance(&self, phase: f64) -> Result<Glance, FitError> {
         if self.frames.len() < LEAST_FRAMES {
             return Err(FitError::TooFewFrames { got: self.frames.len() });
         }
@@ -344,7 +348,7 @@ impl<'a> Problem<'a> {
             .into_par_iter()
             .filter(|(cost, ..)| *cost <= MOST_START_COST * least)
             .filter_map(|(_, unknowns, gait)| Some((gait, few.curves_costs(unknowns)?)))
-            .map(|(gait, [cost, total_cost])| (cost * gait.handicap(), (gait, total_cost)))
+            .map(|(gait, [cost, total_cost])| (cost * gait.handicap(), Glance { gait, total_cost }))
             .collect();
         let best = costs.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
         best.map(|(_, best)| best).ok_or(FitError::Undetermined)

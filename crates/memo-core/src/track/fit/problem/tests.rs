@@ -36,7 +36,7 @@ fn a_short_walk_and_an_empty_picture_are_no_person() {
         let frames: Vec<FitFrame> = (0..count).map(frame).collect();
         let route = path.into();
         let problem = Problem::new(&camera, &walker, &route, &frames, &options);
-        problem.fit(problem.start_gait(0.0)?, Some(0.1))
+        problem.fit(problem.glance(0.0)?.gait, Some(0.1))
     };
     assert_eq!(fit(14), Err(FitError::TooFewFrames { got: 14 }));
     assert_eq!(fit(15), Err(FitError::Undetermined));
@@ -200,7 +200,7 @@ fn means_are_stated_narrower_than_frames() {
     let Drawn { camera, walker, route, frames } = drawn();
     let options = FitOptions::default();
     let problem = Problem::new(&camera, &walker, &route, &frames, &options);
-    let fit = problem.fit(problem.start_gait(0.0).unwrap(), Some(0.1)).unwrap();
+    let fit = problem.fit(problem.glance(0.0).unwrap().gait, Some(0.1)).unwrap();
     for (side, of_side) in fit.mean_sd.angles.iter().enumerate() {
         for (joint, of_joint) in of_side.iter().enumerate() {
             let stated: Vec<f64> =
@@ -430,7 +430,7 @@ fn the_trunk_of_who_is_hidden_in_part_may_lean_more_than_others() {
         let options = FitOptions::default();
         let gait = |frames: &[FitFrame]| {
             let problem = Problem::new(&drawn.camera, &drawn.walker, &drawn.route, frames, &options);
-            problem.start_gait(0.0).unwrap()
+            problem.glance(0.0).unwrap().gait
         };
         assert_eq!(gait(&drawn.frames), StartGait::Average);
         drawn.frames.iter_mut().for_each(|frame| frame.visible = 0.7);
