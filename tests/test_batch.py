@@ -83,7 +83,7 @@ with open(os.path.join(out, "run.json"), "w") as file:
 said = '{"message": "said of ' + os.path.basename(video) + '"'
 if todo[0] == "twice":
     print(said + ', "walks": 2, "each_walk": [{"message": "Goes."}, {"message": "Comes."}], '
-        '"sentences": ["Walk 1 of 2: Goes.", "Walk 1 of 2: Look.", "Walk 2 of 2: Comes."]}')
+        '"sentences": ["Walk 0: Goes.", "Walk 0: Look.", "Walk 1: Comes."]}')
     sys.stderr.write("memo: " + video + ": cut off\\n")
 else:
     print(said + ', "walks": ' + str(int(todo[0] != "nobody")) + ', "each_walk": [], "sentences": []}')
@@ -506,7 +506,7 @@ def test_every_walk_is_counted_and_told(lab):
     result = lab.run(progress=told.append)
     first, *others = lab.status()
     assert (first["walks"], first["message"]) == ("2", "1: Goes. 2: Comes.")
-    assert first["remarks"] == f"{lab.folder / 'v00.mp4'}: cut off; Walk 1 of 2: Look."
+    assert first["remarks"] == f"{lab.folder / 'v00.mp4'}: cut off; Walk 0: Look."
     assert [row["walks"] for row in others] == ["1", "0", ""] and not any(row["remarks"] for row in others)
     assert result.walks == 3
     sentences = list(described(result))

@@ -93,6 +93,17 @@ def every_command(group=None, context=None):
 
 
 @pytest.mark.parametrize(("words", "command"), list(every_command()))
+def test_each_command_shows_its_help(words, command, memo_command):
+    code, said, complained = memo_command(*words.split()[1:], "--help")
+    assert (code, complained) == (0, "")
+    for parameter in command.params:
+        # Where rich writes the help, brackets are markup.
+        assert "[" not in (parameter.help or "") and all(
+            name in said for name in parameter.opts if name.startswith("--")
+        ), parameter.name
+
+
+@pytest.mark.parametrize(("words", "command"), list(every_command()))
 def test_each_command_shows_examples_that_parse(words, command):
     """A paragraph of examples, options as they are, then the exit codes; arguments in capitals."""
     examples, codes = command.epilog.split("\n\n")

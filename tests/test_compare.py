@@ -53,8 +53,8 @@ def test_curves_differ_where_their_interval_excludes_zero():
     assert knee.rms_deg == pytest.approx(np.sqrt(np.mean(bump**2)))
     assert knee.sure_share == pytest.approx(20 / 101) and knee.largest == (60, -20.0, pytest.approx(5.0))
     assert difference_sentences(("A", "B"), [], [knee]) == [
-        "The right knee is 20° (15 to 25) less flexed in B than in A at 60 % of the cycle, and surely for "
-        "20% of it."
+        "The right knee is 20° (15 to 25) less flexed in B than in A at 60% of the cycle; its interval "
+        "excludes zero for 20% of it."
     ]
 
 

@@ -116,8 +116,8 @@ def test_a_table_without_its_columns_is_refused(tmp_path):
 def test_departures_are_said_with_their_interval():
     [said] = departure_sentences([_memo.Departure("left", "knee", -14.6, 5.2, 71, 0.312)])
     assert said == (
-        "The left knee is less flexed than in average walking: 15° (9 to 20) outside the band of "
-        "healthy adults at 71 % of the cycle, and surely outside for 31% of it."
+        "The left knee is less flexed than in healthy adults: at 71% of the cycle it is 15° below their band "
+        "(95% interval 9 to 20°), and the whole interval is outside for 31% of the cycle."
     )
     assert "more flexed" in departure_sentences([_memo.Departure("right", "hip", 6.0, 2.0, 3, 0.1)])[0]
     assert departure_sentences([_memo.Departure("right", "hip", 6.0, 5.7, 3, 0.1)]) == []  # "6° (0 to 12)"

@@ -159,14 +159,14 @@ def test_a_point_where_nobody_is_finds_nobody(memo_command, tmp_path):
 
     code, complained = followed(f"3,3@{frame}")
     assert code == Exit.NOBODY
-    assert f"nobody was tracked at 3,3@{frame}, but person 1 at " in complained
-    place = complained.split("person 1 at ")[1].split("@")[0]
+    assert f"nobody was tracked at 3,3@{frame}, but person 0 at " in complained
+    place = complained.split("person 0 at ")[1].split("@")[0]
     u_px, _ = map(int, place.split(","))
     assert abs(u_px - mean_u_px(scene)[frame]) < 25
     code, complained = followed(f"{place}@{frame}")
     assert code == Exit.TRACKED and "nobody" not in complained
     code, complained = followed(f"{place}@100000")
-    assert code == Exit.NOBODY and "nor anywhere in this frame, but person 1 (frames " in complained
+    assert code == Exit.NOBODY and "nor anywhere in this frame, but person 0 (frames " in complained
 
 
 def test_a_flickering_lamp_changes_little(scene):

@@ -52,7 +52,7 @@ def test_everybody_in_a_frame_is_explained(run):
         ]
         assert np.linalg.norm(middle_px - hips_px) < 40
     page = write_report(run, frames=(chosen[0], chosen[0] + 3)).path.read_text(encoding="utf-8")
-    assert "Walk 2 (person 2): value" in page and "Heel strikes and toe-offs of person 2" in page
+    assert "Walk 1 (person 1): value" in page and "Heel strikes and toe-offs of person 1" in page
 
 
 def test_two_who_come_as_one_region_are_measured_from_where_they_came():

@@ -124,20 +124,23 @@ def test_a_ratio_outside_its_limits_is_mentioned():
 def test_the_verdict_gives_its_reason():
     angles = {name: np.ones(3) for name in TRACK_COLUMNS if name.endswith("_deg")}
     good = {"verdict": "well", "residual_px": 0.5, "height_px": 50.0, "missed": 0.01, "worst_length_sd": 1.0}
-    good |= {"is_beside_the_crown": False, "crown_off": 0.004, "off_parts": []}
+    good |= {"is_far": False, "is_beside_the_crown": False, "crown_off": 0.004, "off_parts": []}
 
     def said(columns=angles, **values):
         return fit_sentence(walk(fit=types.SimpleNamespace(**good | values), columns=columns))
 
-    assert said() == "The model fits the person well: its outline within 0.5 px, 1% of it not seen."
-    assert said(verdict="poorly") == (
-        "The model fits the person poorly: its outline within 0.5 px (1.0% of the person's height), 1% of it "
-        "not seen. Check the overlay before use."
+    on_average = "its outline is on average 0.5 px from the edges in the video"
+    assert said() == f"The model fits the person well: {on_average}, and 1% of it has no edge."
+    assert said(verdict="poorly", is_far=True) == (
+        f"The model fits the person poorly: {on_average}, 1.0% of the person's height, which is too far; "
+        "1% of it has no edge. Check the overlay before use."
     )
+    assert "too far" not in said(verdict="poorly", missed=0.2)
     off = {"off_parts": ["left shank", "left foot"], "part_missed": {"left shank": 0.34, "left foot": 0.4}}
     off |= {"verdict": "in part", "part_residual_px": {"left shank": 1.2}}
-    assert "; worst at the left shank (34% not seen, 1.2 px off) and the left foot (40% not seen)." in said(
-        **off
+    assert (
+        "; worst at the left shank (34% without an edge, 1.2 px off) and the left foot (40% without an edge)."
+        in said(**off)
     )
     assert "shank" not in said(**off | {"verdict": "well"}), "the table of the report has it"
     unseen = {name: np.full(3, np.nan) for name in angles}
@@ -166,11 +169,12 @@ def test_a_head_below_the_person_s_is_named():
         worst_length_sd=1.0,
         is_beside_the_crown=True,
         crown_off=0.15,
+        is_far=False,
         off_parts=[],
     )
     angles = {name: np.array([1.0]) for name in TRACK_COLUMNS if name.endswith("_deg")}
     said = fit_sentence(types.SimpleNamespace(fit=fit, columns=angles))
-    assert "its head 15% of the height below the person's" in said
+    assert "its head is 15% of the height below the person's" in said
 
 
 def in_the_shadow(scene, frames_later, columns):

@@ -106,16 +106,16 @@ def test_the_page_says_how_well_each_part_fits(run_folder):
     fit = {"measured": True, "fits": "in part", "outline_off_px": 0.8, "outline_missed_percent": 5.0}
     fit |= {"parts": parts, "off_parts": ["left shank"], "lengths_m": {}}
     page, _, _ = page_of(run_folder(walks=[{"fit": fit}]))
-    assert "Walk 1: the model fits in part" in page
+    assert "Walk 0: the model fits in part" in page
     assert '<th scope="row"><b>left shank</b></th><td>2.2</td><td>34.0</td>' in page
     assert '<th scope="row">head</th><td>0.4</td><td>2.0</td>' in page
     assert '<th scope="row">left hand</th><td>\N{EN DASH}</td><td>100.0</td>' in page
     assert '<th scope="row">whole outline</th><td>0.8</td><td>5.0</td>' in page
     older = {name: value for name, value in fit.items() if name not in ("parts", "off_parts")}
-    assert "<p>Walk 1: the model fits in part.</p>" in page_of(run_folder(walks=[{"fit": older}]))[0]
+    assert "<p>Walk 0: the model fits in part.</p>" in page_of(run_folder(walks=[{"fit": older}]))[0]
     failed = {"measured": False, "problem": "the model does not fit <the person>"}
     page, _, _ = page_of(run_folder(walks=[{"fit": failed}]))
-    assert "<p>Walk 1: the model does not fit &lt;the person&gt;.</p>" in page
+    assert "<p>Walk 0: the model does not fit &lt;the person&gt;.</p>" in page
 
 
 def page_of(folder, **options):
@@ -375,7 +375,7 @@ def test_what_is_missing_is_said(run_folder, tmp_path):
     written, data, _ = page_of(folder)
     assert "Not in the folder: run.json, events.csv, gait_parameters.csv." in written
     assert "neither the video nor overlay.mp4" in written and data["pictures"]["uri"] == []
-    assert len(data["track"]["frame"]) == 20 and "swapped in walk 1 (probability 40%)." in written
+    assert len(data["track"]["frame"]) == 20 and "swapped in walk 0 (probability 40%)." in written
     folder = run_folder(video=str(tmp_path / "gone.mp4"))
     assert "gone.mp4: no such file" in page_of(folder)[0]
 
@@ -424,16 +424,16 @@ def test_several_walks_and_backwards(run_folder):
     write_track_csv(folder / "track.csv", table)
     written, data, _ = page_of(folder)
     assert (
-        "Walk 2 goes backwards" in written
-        and "Walk 1 goes" not in written
+        "Walk 1 goes backwards" in written
+        and "Walk 0 goes" not in written
         and "10 to 19" in written
-        and '<tr><th scope="row">1</th><td>heel strike</td>' in written
+        and '<tr><th scope="row">0</th><td>heel strike</td>' in written
         and data["track"]["walk"][-1] == 1
     )
 
 
 def test_many_walks_leave_the_picture_in_sight(run_folder):
-    sentences = [f"Walk {k} of 20: Somebody walks." for k in range(1, 21)]
+    sentences = [f"Walk {k}: Somebody walks." for k in range(20)]
     folder = run_folder(sentences=sentences)
     table = read_track_csv(folder / "track.csv")
     table["walk"] = np.arange(20)
@@ -443,9 +443,9 @@ def test_many_walks_leave_the_picture_in_sight(run_folder):
     written, _, _ = page_of(folder)
     head = written[: written.index("<main>")]
     shown, folded = head.split("<details><summary>12 more sentences</summary>")
-    assert "Walk 8 of 20" in shown and "Walk 9 of 20" in folded and "Walk 20 of 20" in folded
-    assert "Walks 4, 8 and 12 go backwards" in head
-    assert "swapped in walks 6 and 7 (probability up to 45%)." in head
+    assert "Walk 7:" in shown and "Walk 8:" in folded and "Walk 19:" in folded
+    assert "Walks 3, 7 and 11 go backwards" in head
+    assert "swapped in walks 5 and 6 (probability up to 45%)." in head
 
 
 def test_an_interrupted_run_says_so(run_folder):
@@ -541,7 +541,7 @@ def test_folders_of_another_kind_are_refused(run_folder, tmp_path, memo_command)
 def test_the_command_says_what_it_wrote(run_folder, tmp_path, memo_command):
     folder = run_folder()
     code, out, err = memo_command("report", folder)
-    assert (code, err) == (0, "") and out.startswith("20 frames with pictures, 20 explained; 0.")
+    assert (code, err) == (0, "") and out.startswith("20 frames shown, 20 of them with their evidence; 0.")
     assert f"Written to {folder}: report.html." in out
     other = tmp_path / "other.html"
     code, out, _ = memo_command("report", folder, "--out", other, "--json", "--frames", "2:5")
@@ -975,7 +975,7 @@ def test_every_person_has_a_tab(two_people, opened):
     page = opened(write_report(two_people).path)
     table = read_track_csv(two_people / "track.csv")
     tabs = page.find_elements("css selector", "#people button")
-    assert [tab.text for tab in tabs] == ["person 1", "person 2"]
+    assert [tab.text for tab in tabs] == ["person 0", "person 1"]
     pictures = []
     for person, cadence in ((0, "108.2"), (1, "95.5"), (0, "108.2")):
         tabs[person].click()
@@ -990,7 +990,7 @@ def test_every_person_has_a_tab(two_people, opened):
         visible = """const parts = [...document.querySelectorAll("[data-person]")];
             return parts.filter((part) => part.clientHeight).map((part) => part.textContent).join()"""
         assert cadence in page.execute_script(visible)
-        assert ("Heel strikes and toe-offs of person 2" in page.execute_script(visible)) == (person == 1)
+        assert ("Heel strikes and toe-offs of person 1" in page.execute_script(visible)) == (person == 1)
         # The first person alone has cycles.
         assert bool(shown_text(page, "#cycles-none")) == (person == 1)
         pictures.append({name: pixels(page, name) for name in ("stage", "view")})

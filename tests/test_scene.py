@@ -115,8 +115,8 @@ def test_walks_before_and_after_a_pause_are_of_one_person():
     )
     assert track.people == [0, 0] and len(track.walks) == 2
     begins = {sentence.split(":")[0] for sentence in track.sentences}
-    assert begins == {"Walk 1 of 2 (person 1)", "Walk 2 of 2 (person 1)"}
+    assert begins == {"Walk 0 (person 0)", "Walk 1 (person 0)"}
     (why,) = [sentence for sentence in track.sentences if "same person" in sentence]
     old, new = (walk.columns for walk in track.walks)
     later_s = new["time_s"][0] - old["time_s"][-1]
-    assert why.startswith("Walk 2 of 2") and f"as in walk 1: it begins {later_s:.1f} s later" in why
+    assert why.startswith("Walk 1 ") and f"as in walk 0: it begins {later_s:.1f} s later" in why

@@ -119,7 +119,7 @@ def test_the_command_writes_the_table_and_every_change(confused, tmp_path, memo_
     path, truth = confused
     code, out, err = memo_unswap(path, "--fps", 25, "--out", tmp_path / "out")
     assert code == 0 and err == "" and len(out.splitlines()) == 2
-    assert "legs in 5" in out and "of 60 frames" in out
+    assert "Exchanged right and left: legs in 5 of 60 frames (none undecided)." in out
     written = tmp_path / "out" / "walk.csv"
     np.testing.assert_array_equal(read_keypoints(written, fps=25).points, truth)
     rows = list(csv.DictReader(written.open()))

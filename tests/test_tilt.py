@@ -82,13 +82,13 @@ def test_what_is_said_of_the_tilt():
         (sentence,) = tilt_sentences(tilt)
         return sentence
 
-    start = "By 40 upright lines in the picture, the camera was "
-    assert said(6.04, 0.8, 2, 3) == start + "turned anticlockwise by 6.0° (standard deviation 0.8°)."
+    start = "From 40 upright lines in the picture: the camera was "
+    assert said(6.04, 0.8, 2, 3) == start + "rolled anticlockwise by 6.0° (standard deviation 0.8°)."
     assert said(-6.04, 0.8, 9, 3) == start + (
-        "turned clockwise by 6.0° (standard deviation 0.8°) and looked 9° downwards (standard deviation 3°)."
+        "rolled clockwise by 6.0° (standard deviation 0.8°) and looked 9° downwards (standard deviation 3°)."
     )
     assert said(0.5, 0.8, -9, 3) == start + (
-        "not turned (standard deviation 0.8°) and looked 9° upwards (standard deviation 3°)."
+        "not rolled to a side (standard deviation 0.8°) and looked 9° upwards (standard deviation 3°)."
     )
     assert "too few upright lines" in said(0.4, 2.8, 1, 9) and "2.8°" in said(0.4, 2.8, 1, 9)
     assert tilt_sentences(None) == []
@@ -102,7 +102,7 @@ def test_who_walks_in_a_picture_that_is_turned_has_the_angles_of_the_upright_one
     tracked = memo.track(frames, fps=25, height_m=1.66)
     (walk,) = tracked.walks
     assert walk.camera_tilt.roll_deg == pytest.approx(6, abs=1)
-    assert any("turned anticlockwise by" in sentence for sentence in tracked.sentences)
+    assert any("rolled anticlockwise by" in sentence for sentence in tracked.sentences)
     truth = gt.read_columns(folder / "truth.csv")
     true = gt.true_angles_deg(truth, gt.walking_direction(truth))
     rows = np.searchsorted(truth["frame"], walk.columns["frame"])

@@ -140,7 +140,7 @@ def difference_sentences(
         digits = 1 if row["unit"] in ("%", "1/min", "deg") else 3
         if shows_zero(size - one.half, digits):
             continue
-        unit = {"deg": "°", "": ""}.get(str(row["unit"]), f" {row['unit']}")
+        unit = {"deg": "°", "": "", "1/min": " per minute"}.get(str(row["unit"]), f" {row['unit']}")
         side = f", {row['side']}" if row["side"] else ""
         said.append(
             f"{str(row['parameter']).replace('_', ' ').capitalize()}{side}: {size:.{digits}f}{unit} "
@@ -154,6 +154,6 @@ def difference_sentences(
         said.append(
             f"The {curve.side} {curve.joint} is {abs(value):.0f}° ({abs(value) - half:.0f} to "
             f"{abs(value) + half:.0f}) {'more' if value > 0 else 'less'} flexed in {names[1]} than in "
-            f"{names[0]} at {percent} % of the cycle, and surely for {curve.sure_share:.0%} of it."
+            f"{names[0]} at {percent}% of the cycle; its interval excludes zero for {curve.sure_share:.0%} of it."
         )
     return said or ["No difference between the two walks can be told."]

@@ -109,10 +109,11 @@ def departure_sentences(departures: Iterable[Departure]) -> list[str]:
     """Reports each joint whose mean cycle is outside of average walking with its whole interval, also as
     printed."""
     return [
-        f"The {d.side} {d.joint} is {'more' if d.excess_deg > 0 else 'less'} flexed than in average walking: "
-        f"{abs(d.excess_deg):.0f}° ({abs(d.excess_deg) - d.half_deg:.0f} to "
-        f"{abs(d.excess_deg) + d.half_deg:.0f}) outside the band of healthy adults at {d.at_percent} % of "
-        f"the cycle, and surely outside for {d.share:.0%} of it."
+        f"The {d.side} {d.joint} is {'more' if d.excess_deg > 0 else 'less'} flexed than in healthy adults: "
+        f"at {d.at_percent}% of the cycle it is {abs(d.excess_deg):.0f}° "
+        f"{'above' if d.excess_deg > 0 else 'below'} their band (95% interval "
+        f"{abs(d.excess_deg) - d.half_deg:.0f} to {abs(d.excess_deg) + d.half_deg:.0f}°), and the whole "
+        f"interval is outside for {d.share:.0%} of the cycle."
         for d in departures
         if not shows_zero(abs(d.excess_deg) - d.half_deg, 0)
     ]

@@ -141,9 +141,7 @@ def _legend(rgb: Rgb, columns: Mapping[str, Any], rows: Sequence[int], several: 
         draw_text(rgb, f"{when}; P: left and right swapped")
         for line, row in enumerate(sorted(rows, key=lambda row: int(columns["person"][row])), start=1):
             person = int(columns["person"][row])
-            text = (
-                f"person {person + 1}: phase {columns['phase'][row]:.2f}, P {columns['p_swapped'][row]:.0%}"
-            )
+            text = f"person {person}: phase {columns['phase'][row]:.2f}, P {columns['p_swapped'][row]:.0%}"
             draw_text(rgb, text, PEOPLE[person % len(PEOPLE)], line=line)
         sides = 1 + len(rows)
     draw_text(rgb, "right", RIGHT, line=sides)

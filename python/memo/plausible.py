@@ -63,15 +63,15 @@ def tilt_sentences(tilt: CameraTilt | None) -> list[str]:
             "The picture shows too few upright lines to tell whether the camera was level: hip angles may "
             f"be off by its roll {sd}."
         ]
-    seen = f"By {tilt.upright_lines:.0f} upright lines in the picture, the camera was"
+    seen = f"From {tilt.upright_lines:.0f} upright lines in the picture: the camera was"
     looks = f"looked {abs(tilt.pitch_deg):.0f}° {'down' if tilt.pitch_deg > 0 else 'up'}wards"
     pitched = f" and {looks} (standard deviation {tilt.pitch_sd_deg:.0f}°)"
     if abs(tilt.pitch_deg) < 2 * tilt.pitch_sd_deg:
         pitched = ""
     if abs(tilt.roll_deg) < 2 * tilt.roll_sd_deg:
-        return [f"{seen} not turned {sd}{pitched}."]
+        return [f"{seen} not rolled to a side {sd}{pitched}."]
     way = "anticlockwise" if tilt.roll_deg > 0 else "clockwise"
-    return [f"{seen} turned {way} by {abs(tilt.roll_deg):.1f}° {sd}{pitched}."]
+    return [f"{seen} rolled {way} by {abs(tilt.roll_deg):.1f}° {sd}{pitched}."]
 
 
 def measured_height_sentences(walk: Walk, *, camera_given: bool = True) -> list[str]:

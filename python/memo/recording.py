@@ -415,13 +415,13 @@ def _not_there(track: Track, point: Point, first_frame: int) -> str:
         points = points[np.isfinite(points).all(axis=1)]
         if len(points):
             u_px, v_px = (points.min(axis=0) + points.max(axis=0)) / 2
-            middles.append(f"person {columns['person'][row] + 1} at {u_px:.0f},{v_px:.0f}@{point.frame}")
+            middles.append(f"person {columns['person'][row]} at {u_px:.0f},{v_px:.0f}@{point.frame}")
     if middles:
         return f"{said}, but {' and '.join(middles)}: the results are those of everybody"
     known = []
     for person in sorted(set(track.people)):
         own = columns["frame"][columns["person"] == person] + first_frame
-        known.append(f"person {person + 1} (frames {own.min()} to {own.max()})")
+        known.append(f"person {person} (frames {own.min()} to {own.max()})")
     return (
         f"{said}, nor anywhere in this frame, but {' and '.join(known)}: the results are those of everybody"
     )

@@ -440,9 +440,9 @@ class Track:
                 told += departure_sentences(walk.departures) if is_sure else []
             whose = ""
             if len(self.walks) > 1:
-                whose = f"Walk {index + 1} of {len(self.walks)} (person {self.people[index] + 1}): "
+                whose = f"Walk {index} (person {self.people[index]}): "
             elif self.people[index] > 0:
-                whose = f"Person {self.people[index] + 1}: "
+                whose = f"Person {self.people[index]}: "
             said += [whose + sentence for sentence in told]
         return said + left_out
 
@@ -466,7 +466,7 @@ class Track:
         apart_m = np.hypot(new["x_m"][0] - old["x_m"][-1], new["y_m"][0] - old["y_m"][-1])
         later_s = new["time_s"][0] - old["time_s"][-1]
         return [
-            f"This is the same person as in walk {before + 1}: it begins {later_s:.1f} s later, "
+            f"This is the same person as in walk {before}: it begins {later_s:.1f} s later, "
             f"{apart_m:.1f} m from where that walk ended."
         ]
 
@@ -720,7 +720,7 @@ def _parts_in_words(fit: _memo.WalkFit) -> str:
     def off(name: str) -> str:
         off_px = fit.part_residual_px.get(name)
         beside = "" if off_px is None else f", {off_px:.1f} px off"
-        return f"the {name} ({fit.part_missed[name]:.0%} not seen{beside})"
+        return f"the {name} ({fit.part_missed[name]:.0%} without an edge{beside})"
 
     *first, last = map(off, fit.off_parts[:_MOST_PARTS])
     return f"{', '.join(first)} and {last}" if first else last
@@ -733,16 +733,21 @@ def fit_sentence(walk: _memo.Walk) -> str | None:
         if walk.fit_problem is None:
             return None
         return f"The joint angles were not measured: {walk.fit_problem}."
-    missed = f"{fit.missed:.0%} of it not seen"
+    near = f"its outline is on average {fit.residual_px:.1f} px from the edges in the video"
+    missed = f"{fit.missed:.0%} of it has no edge"
     if fit.verdict == "well":
-        return f"The model fits the person well: its outline within {fit.residual_px:.1f} px, {missed}."
-    share = fit.residual_px / fit.height_px
-    seen = f"its outline within {fit.residual_px:.1f} px ({share:.1%} of the person's height), {missed}"
+        return f"The model fits the person well: {near}, and {missed}."
+    too_far = (
+        f", {fit.residual_px / fit.height_px:.1%} of the person's height, which is too far"
+        if fit.is_far
+        else ""
+    )
+    seen = f"{near}{too_far}; {missed}"
     if fit.worst_length_sd >= 3:
-        seen += f", a length of the body {fit.worst_length_sd:.1f} standard deviations from the average"
+        seen += f"; a length of the body is {fit.worst_length_sd:.1f} standard deviations from the average"
     if fit.is_beside_the_crown and fit.crown_off is not None:
         where = "below" if fit.crown_off > 0 else "above"
-        seen += f", its head {abs(fit.crown_off):.0%} of the height {where} the person's"
+        seen += f"; its head is {abs(fit.crown_off):.0%} of the height {where} the person's"
     if fit.off_parts:
         seen += f"; worst at {_parts_in_words(fit)}"
     unsure = "Check the overlay before use."

@@ -26,6 +26,8 @@ result! {
         /// How far the moving region reaches above the model's head, in the median of the frames, as a share of
         /// the person's height in the image; None if no frame shows the person alone.
         crown_off: Option<f64> = fit.quality.crown_off,
+        /// Whether the edges are too far from the outline for a good fit, as a share of the person's height.
+        is_far: bool = fit.quality.is_far(),
         /// Whether the head of the model is not where the person's is.
         is_beside_the_crown: bool = fit.quality.is_beside_the_crown(),
         /// Whether the feet do not stand on the ground of a calibrated camera.

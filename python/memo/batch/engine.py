@@ -482,7 +482,8 @@ def described(result: BatchResult) -> Iterator[str]:
     yield from _of_walks(result.records)
     if result.done_now:
         each = result.seconds / result.done_now
-        yield f"{result.done_now} in this run, {result.seconds:.0f} s, {each:.2f} s per video."
+        done = counted(result.done_now, "video")
+        yield f"{done} in this run took {result.seconds:.0f} s, {each:.2f} s each."
     yield from result.notes
 
 

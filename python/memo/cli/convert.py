@@ -70,7 +70,7 @@ def add_convert(app: "typer.Typer") -> None:
             Axis | None, typer.Option(help="Up axis of SOURCE, in place of the one it names.")
         ] = None,
         rate: Annotated[
-            float | None, typer.Option(help="Frame rate of TARGET, Hz, interpolated linearly.")
+            float | None, typer.Option(help="Frame rate to which TARGET is interpolated linearly, Hz.")
         ] = None,
         fill: Annotated[
             float | None, typer.Option(help="Longest gap to interpolate linearly, seconds.")
@@ -102,7 +102,7 @@ def add_convert(app: "typer.Typer") -> None:
         ] = None,
         unit: Annotated[
             str | None,
-            typer.Option(help="Unit of a SOURCE that names none: m, cm, mm, or its length in metres."),
+            typer.Option(help="Unit of lengths, if SOURCE names none: m, cm, mm, or its length in metres."),
         ] = None,
         as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
         quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,

@@ -56,12 +56,13 @@ def add_planar(app: "typer.Typer") -> None:
         person: Person = None,
         image_size: ImageSize = None,
         carry: Annotated[
-            bool, typer.Option("--carry", help="Carry lengths through windows that no plane fits.")
+            bool, typer.Option("--carry", help="Keep lengths from window to window where no plane fits.")
         ] = False,
         names: Annotated[
             bool,
             typer.Option(
-                "--names", help="The columns name joints (RKN or right_knee): limbs bend as joints can."
+                "--names",
+                help="Use the joint names of the columns (RKN or right_knee): limbs bend only as joints can.",
             ),
         ] = False,
         focal_px: Annotated[

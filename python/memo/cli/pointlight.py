@@ -147,7 +147,7 @@ def add_pointlight(app: "typer.Typer") -> None:
             typer.Option(help="With MOTION and --cycles: times as fast; default: 1.", min=0.1, max=10),
         ] = None,
         azimuth_deg: Annotated[
-            float, typer.Option(help="Azimuth of the viewer, degrees; 90 looks from +x.")
+            float, typer.Option(help="Direction of the viewer, degrees: 0 from the side, 90 from the front.")
         ] = usual["azimuth_deg"],
         elevation_deg: Annotated[
             float, typer.Option(help="Elevation of the viewer, degrees.", min=-90, max=90)
@@ -201,7 +201,7 @@ def add_pointlight(app: "typer.Typer") -> None:
         noise_area: Annotated[
             float | None,
             typer.Option(
-                help="With --noise-dots: width and height of their region, in those of the figure; "
+                help="With --noise-dots: size of their region, as a multiple of the figure's; "
                 f"default: {usual['noise_area']}."
             ),
         ] = None,

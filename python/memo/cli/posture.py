@@ -156,7 +156,7 @@ def add_posture(app: "typer.Typer") -> None:
     ) -> None:
         """Finds the 3D postures that KEYPOINTS allow, and the most probable motion.
 
-        The motion may break a limit at a cost, so it need not consist of the postures that are left.
+        The most probable motion may break a constraint at a cost: it can contain postures that were excluded.
         """
         folder = out or Path("memo-out") / keypoints.resolve().stem
         delivery = Delivery(folder, plots=plots, as_json=as_json, quiet=quiet)
@@ -266,7 +266,7 @@ def _lines(postures: memo.Postures) -> list[str]:
 
 def _frames_line(postures: memo.Postures) -> str:
     left = postures.survivors > 0
-    line = f"{counted(len(postures.frames), 'frame')}, postures left in {left.sum()}"
+    line = f"{counted(len(postures.frames), 'frame')}, of which {left.sum()} have possible postures"
     if left.any():
         counts = [
             (len(sizes), True) if count is None else (count, False)
@@ -274,13 +274,14 @@ def _frames_line(postures: memo.Postures) -> str:
         ]
         middle, is_more = sorted(counts[row] for row in np.flatnonzero(left))[left.sum() // 2]
         groups = counted(middle, "group") + " or more" * is_more
-        line += f", median {np.median(postures.survivors[left]):.0f} in {groups}"
+        line += f", {np.median(postures.survivors[left]):.0f} each in {groups} (medians)"
     line += _why_none(postures)
     breaking = sum(map(bool, postures.linked_breaks))
     if breaking:
-        line += f"; the posture in the motion breaks a constraint in {breaking} ({_most_broken(postures)})"
+        line += f"; in {counted(breaking, 'frame')} the chosen posture breaks a constraint"
+        line += f" ({_most_broken(postures)})"
     if postures.repair is not None and any(postures.repair.exchanged.values()):
-        line += f"; right and left exchanged: {exchanges(postures.repair)}"
+        line += f"; right and left were exchanged: {exchanges(postures.repair)}"
     return f"{line}."
 
 
@@ -329,7 +330,6 @@ def _second_line(postures: memo.Postures) -> str:
     if second.first_frame == second.last_frame:
         where = f"frame {second.first_frame}"
     return (
-        f"Near and far: {joints} mirrored in depth in {where} has"
-        f" probability {second.p:.0%} (margin {second.margin_nats:.1f} nats);"
-        f" at this noise some joint is undecided in {undecided}."
+        f"Least certain depth: {joints} in {where}, mirrored with a probability of {second.p:.0%}."
+        f" At this noise at least one joint is undecided in {undecided}."
     )

@@ -104,9 +104,10 @@ def _lines(report: "Report") -> list[str]:
     """Describes the page in sentences."""
     contents = report.contents
     if "walks" in contents:
-        return [*contents["sentences"], *contents["notes"]]
+        return [contents["compared"], *contents["sentences"], *contents["notes"]]
     if report.kind == "memo track":
-        line = f"{counted(contents['pictures'], 'frame')} with pictures, {contents['explained']} explained"
+        evidence = f"{contents['explained']} of them with their evidence"
+        line = f"{counted(contents['pictures'], 'frame')} shown, {evidence}"
     else:
         line = counted(contents["frames"], "frame")
     return [f"{line}; {report.bytes / 1e6:.1f} MB.", *contents["notes"]]

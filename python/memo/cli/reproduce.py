@@ -46,7 +46,7 @@ def add_reproduce(app: "typer.Typer") -> None:
         paper: Annotated[Paper, typer.Argument(metavar="PAPER", help=HELP)] = Paper.ALL,
         out: Annotated[
             Path | None,
-            typer.Option(help="Folder for rows and figures; default: memo-out/reproduce[/PAPER]."),
+            typer.Option(help="Folder for rows and figures; default: memo-out/reproduce, or PAPER in it."),
         ] = None,
         video: Annotated[
             Path | None,
@@ -65,7 +65,8 @@ def add_reproduce(app: "typer.Typer") -> None:
     ) -> None:
         """Computes the tables, figures and numbers of the papers again, beside the printed ones.
 
-        A row is the same, differs (with the reason), is made in kind from other input, or cannot be made.
+        Each row is "same", "differs" (with the reason), "in kind" (computed from other input than the
+        paper's) or "cannot" (it cannot be computed).
         """
         folder = out or (Path("memo-out/reproduce") / ("" if paper is Paper.ALL else paper.value))
 

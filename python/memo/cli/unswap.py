@@ -111,9 +111,7 @@ def _unswap(path: Path, reading: dict[str, Any], as_format: Written, delivery: D
         "left_out": left_out,
         "doubts": keypoints.doubts,
     }
-    lines = [
-        f"Right and left exchanged, of {counted(frames, 'frame')}: {exchanges(repair)}; {_majority(repair)}."
-    ]
+    lines = [f"Exchanged right and left: {exchanges(repair)}. {_majority(repair)}."]
     lines[0] += one_of_several(keypoints, reading["person"] is None)
     lines += [f"Warning: {doubt}." for doubt in keypoints.doubts]
     if left_out:
@@ -143,8 +141,8 @@ def _shown(someone: Someone) -> str:
 
 
 def exchanges(repair: memo.SideRepair) -> str:
-    """Describes how many frames were exchanged and how many are undecided."""
-    done = _by_group(repair.exchanged)
+    """Describes in how many frames the sides were exchanged and in how many they are undecided."""
+    done = f"{_by_group(repair.exchanged)} of {counted(len(repair.keypoints.frames), 'frame')}"
     doubt = _by_group({group: frames for group, frames in repair.undecided.items() if frames})
     guessed = _by_group({group: frames for group, frames in repair.guessed.items() if frames})
     doubt += f", exchanged by the best guess: {guessed}" if guessed else ""
@@ -158,4 +156,4 @@ def _by_group(frames: dict[str, int]) -> str:
 def _majority(repair: memo.SideRepair) -> str:
     """What the repair assumes."""
     sure = " and ".join(f"{group} {p:.0%}" for group, p in repair.p_global.items())
-    return f"assumed: most frames are labelled correctly (probability from the majority alone: {sure})"
+    return f"This assumes that most frames are labelled correctly (probability of that: {sure})"

@@ -32,8 +32,9 @@ _NO_DIFFERENCE = "no difference can be told"
 def comparison_page(
     folders: tuple[Path, Path], walks: tuple[int | None, int | None]
 ) -> tuple[Page, dict[str, Any]]:
-    """The page of a walk of each folder, by default the longest, and its `walks`, `sentences` and `notes`.
+    """The page of a walk of each folder, by default the longest, and its contents.
 
+    The contents are `walks`, `compared` (which walk is A and which is B), `sentences` and `notes`.
     ValueError names a folder that lacks a table or the walk.
     """
     runs = (read_run_folder(folders[0]), read_run_folder(folders[1]))
@@ -63,7 +64,9 @@ def comparison_page(
         },
         data={"cycles": _cycles(runs, chosen)},
     )
-    return page, {"walks": list(chosen), "sentences": sentences, "notes": notes}
+    names = [_name(run, walk) for run, walk in zip(runs, chosen, strict=True)]
+    compared = f"A is {names[0]}, B is {names[1]}."
+    return page, {"walks": list(chosen), "compared": compared, "sentences": sentences, "notes": notes}
 
 
 def _walk(run: RunFolder, wanted: int | None) -> int:
@@ -85,7 +88,7 @@ def _walk(run: RunFolder, wanted: int | None) -> int:
 def _name(run: RunFolder, walk: int) -> str:
     """The folder, and the walk if there are several."""
     several = len(np.unique(run.columns["walk"])) > 1
-    return run.path.resolve().name + (f", walk {walk + 1}" if several else "")
+    return run.path.resolve().name + (f", walk {walk}" if several else "")
 
 
 def _p_swapped(run: RunFolder, walk: int) -> float:

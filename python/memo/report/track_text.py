@@ -130,8 +130,8 @@ def _warnings(run: RunFolder, notes: list[str]) -> str:
 
 
 def _numbered(walks: list[int]) -> str:
-    """`walk 2`, or `walks 1, 2 and 5`, counted from 1."""
-    *most, last = [str(walk + 1) for walk in walks]
+    """`walk 2`, or `walks 0, 2 and 5`."""
+    *most, last = [str(walk) for walk in walks]
     return f"walks {', '.join(most)} and {last}" if most else f"walk {last}"
 
 
@@ -178,8 +178,8 @@ def _walks(run: RunFolder) -> str:
         first, last = rows_of[0], rows_of[-1]
         rows.append(
             (
-                str(walk + 1),
-                str(int(table["person"][first]) + 1),
+                str(walk),
+                str(int(table["person"][first])),
                 f"{table['frame'][first]} to {table['frame'][last]}",
                 f"{number(table['time_s'][first])} to {number(table['time_s'][last])}",
                 f"{number(table['x_m'][first])} to {number(table['x_m'][last])}",
@@ -188,7 +188,7 @@ def _walks(run: RunFolder) -> str:
             )
         )
     header = ("walk", "person", "frames", "time, s", "X, m", "median speed, m/s", "P(left and right swapped)")
-    return rows_table("Walks in this video (the files count them from 0)", header, rows)
+    return rows_table("Walks in this video", header, rows)
 
 
 def _left_out(run: RunFolder) -> str:
@@ -246,7 +246,7 @@ def _of_person(person: int, inside: str) -> str:
 def _of_walk(run: RunFolder, walk: int, lines: list[dict[str, Any]]) -> str:
     """The table of gait parameters of a walk."""
     several = len(run.people) > 1
-    name = f"Walk {walk + 1}" + f" (person {lines[0]['person'] + 1})" * several
+    name = f"Walk {walk}" + f" (person {lines[0]['person']})" * several
     known = [line for line in lines if np.isfinite(line["value"])]
     if not known:
         return f"<p>{name}: too short or too uncertain for any.</p>"
@@ -269,7 +269,7 @@ def _fits(run: RunFolder) -> str:
 
 
 def _fit_of_walk(run: RunFolder, walk: int) -> str:
-    fit, name = run.fit(walk), f"Walk {walk + 1}"
+    fit, name = run.fit(walk), f"Walk {walk}"
     if not fit.get("measured"):
         return f"<p>{name}: {text(fit.get('problem') or 'the person was not measured')}.</p>"
     caption = f"{name}: the model fits {text(fit['fits'])}"
@@ -323,7 +323,7 @@ def _events(run: RunFolder) -> str:
     for person, walks in people.items():
         rows = [
             (
-                *((str(run.walk_of(event) + 1),) if several else ()),
+                *((str(run.walk_of(event)),) if several else ()),
                 text(str(event["event"]).replace("_", " ")),
                 text(event["side"]),
                 number(event["time_s"], 3),
@@ -333,7 +333,7 @@ def _events(run: RunFolder) -> str:
             if run.walk_of(event) in walks
         ]
         if rows:
-            caption = "Heel strikes and toe-offs" + f" of person {person + 1}" * (len(people) > 1)
+            caption = "Heel strikes and toe-offs" + f" of person {person}" * (len(people) > 1)
             tables += _of_person(person, rows_table(caption, header, rows))
     return tables
 

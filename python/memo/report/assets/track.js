@@ -339,7 +339,7 @@ const drawCycles = () => {
 };
 function startCycles() {
   const shown = data.cycles.walks.filter((walk) => walks.has(walk));
-  choice.replaceChildren(...shown.map((walk) => element("option", { value: walk }, `walk ${walk + 1}`)));
+  choice.replaceChildren(...shown.map((walk) => element("option", { value: walk }, `walk ${walk}`)));
   $("cycle-choice").hidden = shown.length < 2;
   $("cycles-none").textContent = shown.length || !data.cycles.walks.length ? data.no_cycles : "This person has no measured cycles.";
   if (shown.length) drawCycles();
@@ -363,7 +363,7 @@ function showPerson() {
   if (frames.length) player.show(rowOf.has(frames[player.at]) ? player.at : Math.max(0, first));
 }
 for (const one of people.length > 1 ? people : []) {
-  const tab = element("button", { type: "button", role: "tab", value: one }, `person ${one + 1}`);
+  const tab = element("button", { type: "button", role: "tab", value: one }, `person ${one}`);
   tab.addEventListener("click", () => { choose(one); showPerson(); });
   tab.addEventListener("keydown", (event) => {
     const step = { ArrowLeft: -1, ArrowRight: 1 }[event.key];

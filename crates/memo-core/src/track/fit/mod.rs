@@ -94,7 +94,7 @@ pub const LEAST_FRAMES: usize = 15;
 #[non_exhaustive]
 pub enum FitError {
     /// The walk is too short.
-    #[error("{} do not show a walk: {LEAST_FRAMES} are needed to measure a person", counted(*.got, "frame"))]
+    #[error("the walk has only {}, and {LEAST_FRAMES} are needed", counted(*.got, "frame"))]
     TooFewFrames {
         /// Frames given.
         got: usize,

@@ -81,10 +81,7 @@ impl FitQuality {
     /// The verdict.
     #[must_use]
     pub fn verdict(&self) -> FitVerdict {
-        if self.missed >= POORLY_MISSED
-            || self.residual_px >= POORLY_OFF * self.height_px
-            || self.is_beside_the_crown()
-        {
+        if self.missed >= POORLY_MISSED || self.is_far() || self.is_beside_the_crown() {
             FitVerdict::Poorly
         } else if self.missed < WELL_MISSED && self.worst_length_sd < WELL_LENGTH_SD {
             FitVerdict::Well
@@ -111,6 +108,12 @@ impl FitQuality {
         let mut found: Vec<(f64, Part)> = Part::ALL.iter().filter_map(off).collect();
         found.sort_by(|a, b| b.0.total_cmp(&a.0));
         found.into_iter().map(|(_, part)| part).collect()
+    }
+
+    /// True if the edges are farther from the outline than a good fit leaves them.
+    #[must_use]
+    pub fn is_far(&self) -> bool {
+        self.residual_px >= POORLY_OFF * self.height_px
     }
 
     /// True if the head of the model is not where the person's is.
