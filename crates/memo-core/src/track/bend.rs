@@ -11,15 +11,16 @@
 //! route of a person who turned is smoothed again.
 
 use super::active::Active;
-use super::decisions::{CLEAR_TURN, EARLY_TURN_GAIN, QUICK_TURN_GAIN, TURN_GAIN};
+use super::decisions::{CLEAR_TURN, EARLY_TURN_GAIN, QUICK_TURN_GAIN, SLIGHT_TURN_RAD, TURN_GAIN};
 use super::frontal::Frontal;
 use super::locate::{Rows, Sighting};
 use super::options::TrackerOptions;
 use super::route::Route;
-use super::search::{Axis, Grid, Hypothesis, PHASE_STEP, POSITION_STEP_M, Scene, search_peak};
+use super::search::{Axis, Grid, Hypothesis, PHASE_STEP, POSITION_STEP_M, Path, Scene, search_peak};
 use super::swap::log_odds;
 use super::trail::{Anchor, CORNER_JERK_SD, JERK_SD, Trail};
 use super::walk::{FrameEdges, Step, Walk};
+use glam::DVec2;
 
 /// A turn is looked for after this many further frames.
 const EVERY: usize = 10;
@@ -88,6 +89,38 @@ impl Active {
             for jerk_sd in [JERK_SD, CORNER_JERK_SD] {
                 self.bend(0, When::Ended, jerk_sd, options);
             }
+            self.turn_back(options);
+        }
+    }
+
+    /// Gives up a curve that only contours show: all rectangles of the walk together do not turn. Contours that are unlike the
+    /// model's, as of somebody who walks very slowly, may be more similar on any other route.
+    fn turn_back(&mut self, options: &TrackerOptions) {
+        let steps = self.steps();
+        let (Some(first), Some(last)) = (steps.first(), steps.last()) else { return };
+        let (along_m, count) = (first.state.along.position, steps.len());
+        let headings = steps.iter().map(|step| self.walk.route.at(step.state.along.position).direction());
+        let middle = self.walk.route.at(steps[steps.len() / 2].state.along.position).direction();
+        let (least, most) = headings.fold((0.0f64, 0.0f64), |(least, most), ahead| {
+            let off_rad = middle.angle_to(ahead);
+            (least.min(off_rad), most.max(off_rad))
+        });
+        let is_whole = self.kept.first().is_some_and(|(_, edges)| edges.frame == first.frame);
+        if !is_whole || most - least < SLIGHT_TURN_RAD || steps.iter().any(|step| step.by_feet) {
+            return;
+        }
+        let last = last.frame;
+        let seen = self.kept.iter().filter(|(_, edges)| edges.frame <= last);
+        let sightings: Vec<Sighting> = seen.filter_map(|(sighting, _)| *sighting).collect();
+        let trail = Trail::new(self.rows, &[], &sightings, &self.camera, &self.crown());
+        let places = trail.straight();
+        let (Some(from), Some(to)) = (places.first(), places.last()) else { return };
+        if trail.turn_gain() < CLEAR_TURN {
+            let heading_rad = (*to - *from).to_angle();
+            let origin = *from - along_m * DVec2::from_angle(heading_rad);
+            // Feet show the way of those alone who turn.
+            self.frontal = None;
+            self.follow_on(&Path { origin, heading_rad }.into(), 0..count, last, &options.walk);
         }
     }
 
@@ -313,6 +346,21 @@ mod tests {
         straight.turn(&options());
         assert!(!straight.has_turned(&options()));
         assert_eq!(straight.walk, before);
+    }
+
+    #[test]
+    fn a_curve_is_given_up_at_the_end_if_all_rectangles_together_do_not_turn() {
+        let (route, given) = (arc(-2.5), TrackerOptions { camera: Some(camera()), ..options() });
+        for (rectangles, is_straight) in [(PATH.into(), true), (route.clone(), false)] {
+            let mut turning = followed(&route, &rectangles);
+            (turning.walk, turning.frontal) = turning.on_route(&route, 0, &given);
+            turning.turn_back(&given);
+            assert_eq!((turning.walk.route.is_straight(), turning.steps().len()), (is_straight, 50));
+            assert!(turning.frontal.is_none() == is_straight);
+            assert!(!is_straight || turning.steps().iter().all(|step| !step.by_feet));
+            let heading_rad = turning.walk.route.at(turning.steps()[25].state.along.position).heading_rad;
+            assert!(!is_straight || (heading_rad - PATH.heading_rad).abs() < 0.1, "{heading_rad}");
+        }
     }
 
     #[test]

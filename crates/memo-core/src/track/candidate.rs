@@ -2,7 +2,8 @@
 
 use super::active::Active;
 use super::decisions::{
-    FASTEST_MPS, GLANCE_CONTRAST, GLANCE_SHARE, OTHER_GAIT_GAIN, SLANT_GAIN, SLOWEST_MPS, WALKER_CONTRAST,
+    FASTEST_MPS, GLANCE_CONTRAST, GLANCE_SHARE, MOST_APART_S, OTHER_GAIT_GAIN, SLANT_GAIN, SLOWEST_MPS,
+    WALKER_CONTRAST,
 };
 use super::fit::views::Piece;
 use super::height::{BodyHeight, GIVEN_SD_M};
@@ -139,6 +140,13 @@ impl Candidate {
         self.missed == 0 && self.seen.len() >= frames.max(self.least)
     }
 
+    /// Mean time from one of its frames to the next, seconds.
+    fn apart_s(&self) -> f64 {
+        let ends = self.seen.first().zip(self.seen.last());
+        let lasts_s = ends.map_or(0.0, |(first, last)| last.edges.time_s - first.edges.time_s);
+        lasts_s / (self.seen.len().max(2) - 1) as f64
+    }
+
     /// Starts a walk, or says why not: things that do not move like a walker.
     ///
     /// 1. Camera and course from the rectangles.
@@ -147,6 +155,10 @@ impl Candidate {
     /// 3. Both twins followed through the start frames.
     pub fn begin(&self, given: &Given<'_>) -> Result<Active, Reason> {
         let options = given.options;
+        let apart_s = self.apart_s();
+        if apart_s > MOST_APART_S {
+            return Err(Reason::FramesApart { apart_s });
+        }
         let mut sightings: Vec<Sighting> = self.seen.iter().map(|seen| seen.sighting).collect();
         if feet_cut_off(&sightings, given.size[1] as usize) {
             return Err(Reason::CutOff);

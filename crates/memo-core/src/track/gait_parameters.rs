@@ -51,6 +51,7 @@ use super::walk::Step;
 use crate::estimate::line::line_through;
 use crate::model::ASSUMED_FOCAL_SD;
 use crate::model::skeleton::Side;
+use std::ops::RangeInclusive;
 
 /// If the probability that sides are swapped, or that the person walks in the other direction or has the other heading on a
 /// treadmill, is larger, no value by side is reported.
@@ -155,7 +156,7 @@ pub struct GaitParameter {
     pub side: Option<Side>,
     /// The value in the quantity's unit; `None` if it is not known.
     pub value: Option<f64>,
-    /// 95 % interval; `None` if the value is not known.
+    /// 95 % interval, without what is impossible; `None` if the value is not known.
     pub interval: Option<[f64; 2]>,
     /// Number of steps used, or of cycles; 0 if the value is not known.
     pub n: usize,
@@ -168,7 +169,10 @@ impl TrackedWalk {
         let sides = whole.as_ref().and_then(|whole| self.sides(whole));
         let mut table = Vec::new();
         let mut add = |quantity, side, estimate: Option<Estimate>| {
-            let (value, interval) = (estimate.map(|e| e.value), estimate.map(|e| e.interval()));
+            let possible = possible(quantity);
+            let estimate = estimate.filter(|e| possible.contains(&e.value));
+            let within = |end: f64| end.clamp(*possible.start(), *possible.end());
+            let (value, interval) = (estimate.map(|e| e.value), estimate.map(|e| e.interval().map(within)));
             table.push(GaitParameter { quantity, side, value, interval, n: estimate.map_or(0, |e| e.n) });
         };
         use GaitQuantity::{
@@ -345,6 +349,16 @@ impl TrackedWalk {
         let distance = relative.hypot(POSTURE_SD);
         let along_view_sq = path.direction().dot(self.view()).powi(2);
         if self.tilt.is_some() { distance.hypot(ASSUMED_FOCAL_SD * along_view_sq) } else { distance }
+    }
+}
+
+/// What a value can be: a share of the cycle is 0 to 100 %. Who walks has no time without a foot on the ground, so a walk whose
+/// double support comes out below zero shows none.
+fn possible(quantity: GaitQuantity) -> RangeInclusive<f64> {
+    use GaitQuantity::{DoubleSupport, SingleSupport, Stance, Swing};
+    match quantity {
+        Stance | Swing | SingleSupport | DoubleSupport => 0.0..=100.0,
+        _ => f64::NEG_INFINITY..=f64::INFINITY,
     }
 }
 

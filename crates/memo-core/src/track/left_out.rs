@@ -75,6 +75,11 @@ pub enum Reason {
     Beside,
     /// Larger regions moved at the same time, as many as are looked at.
     Crowded,
+    /// Its frames are too far apart for steps to be followed, or their times are not in seconds.
+    FramesApart {
+        /// Mean time from frame to frame, seconds.
+        apart_s: f64,
+    },
     /// It moved over the ground, and a walk on a treadmill was asked for.
     OverGround {
         /// At this speed, m/s.
@@ -97,11 +102,12 @@ impl Reason {
             Self::TooBrief { .. } => "too brief",
             Self::Beside => "beside somebody",
             Self::Crowded => "too many",
+            Self::FramesApart { .. } => "frames too far apart",
             Self::OverGround { .. } => "over ground",
         }
     }
 
-    /// Its figure: pixels, m/s or frames; `None` for a reason without one.
+    /// Its figure: pixels, m/s, seconds or frames; `None` for a reason without one.
     #[must_use]
     pub fn value(&self) -> Option<f64> {
         match *self {
@@ -109,6 +115,7 @@ impl Reason {
             Self::TooSlow { speed_mps } | Self::TooFast { speed_mps } | Self::OverGround { speed_mps } => {
                 Some(speed_mps)
             }
+            Self::FramesApart { apart_s } => Some(apart_s),
             Self::TooBrief { frames } => Some(frames as f64),
             _ => None,
         }

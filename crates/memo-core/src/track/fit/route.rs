@@ -22,6 +22,7 @@ use super::problem::{FitFrame, Problem, Room, Width};
 use super::unknowns::{ACROSS, ALONG, BEND, FIGURE, HEADING, Unknowns, WHOLE_BEND};
 use crate::estimate::line::line_through;
 use crate::model::{Camera, Walker};
+use crate::track::decisions::SLIGHT_TURN_RAD;
 use crate::track::route::Route;
 use crate::track::search::Path;
 use glam::DVec2;
@@ -37,9 +38,6 @@ const CURVATURE_SD: f64 = 0.15;
 const POINTS_M: f64 = 0.1;
 /// How often the route is moved before the fit.
 const STEPS: usize = 2;
-/// A route that turns by less is compared with a line. People who turn more have edges that are nearer by 13 % and more on their
-/// route.
-const SLIGHT_TURN_RAD: f64 = 0.6;
 
 /// Where the sideways movement of a route is described: between these lengths along it, metres.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -3,6 +3,7 @@
 use super::super::active::Active;
 use super::super::approach::Approach;
 use super::super::candidate::{COMFORTABLE_MPS, Given, course, feet_cut_off};
+use super::super::decisions::MOST_APART_S;
 use super::super::evidence::Evidence;
 use super::super::fit::views::Piece;
 use super::super::locate::{Crown, Rows, Sighting, locate_by};
@@ -41,6 +42,10 @@ impl Tracker {
         let (least, every) = (self.options.path_frames, self.options.start_frames);
         let further = self.standing.kept.len().checked_sub(least);
         if !self.people.is_empty() || further.is_none_or(|further| !further.is_multiple_of(every)) {
+            return;
+        }
+        if self.standing.lasts_s() > MOST_APART_S * self.standing.kept.len() as f64 {
+            self.standing = Standing::default();
             return;
         }
         let size = [evidence.grey.width() as u32, evidence.grey.height() as u32];

@@ -2,7 +2,8 @@
 
 use super::super::super::decisions::{
     FIT_PLACE_SD, HEIGHT_MODEL_SD_M, MEAN_MODEL_SD_RAD, MEAN_OFF_ACROSS_SD_M, MEAN_OFF_SD_RAD, MEAN_PLACE_SD,
-    MODEL_SD_RAD, MOST_SD_RAD, OFF_ACROSS_SD_M, OFF_SD_RAD, SD_FACTOR, ZERO_BLUR_PX, ZERO_SD,
+    MODEL_SD_RAD, MOST_MISSED_OF_ARM, MOST_SD_RAD, OFF_ACROSS_SD_M, OFF_SD_RAD, SD_FACTOR, ZERO_BLUR_PX,
+    ZERO_SD,
 };
 use super::super::belt::{self, Belt};
 use super::super::contacts::{self, Feet};
@@ -14,9 +15,21 @@ use super::super::{FitQuality, FittedFrame, MeanSd, Measured, PartQuality, WalkF
 use super::{Fitted, Problem};
 use crate::estimate::arrow::Covariance;
 use crate::estimate::median::median;
+use crate::model::body::Part;
 use crate::track::height::{BodyHeight, HeightSource};
 use glam::DVec2;
 use rayon::prelude::*;
+
+/// Which joints of each side are not those of an arm that is elsewhere than the model's.
+pub(super) fn arms_seen(quality: &FitQuality) -> [[bool; JOINTS]; 2] {
+    let is_seen =
+        |part: Part| quality.parts[part as usize].is_none_or(|of_part| of_part.missed <= MOST_MISSED_OF_ARM);
+    let arms = [(Part::RightUpperArm, Part::RightForearm), (Part::LeftUpperArm, Part::LeftForearm)];
+    arms.map(|(upper_arm, forearm)| {
+        let shoulder = is_seen(upper_arm);
+        [true, true, true, shoulder, shoulder && is_seen(forearm)]
+    })
+}
 
 impl Problem<'_> {
     /// How much of a measured zero of the phase is believed: contacts of small people are blurred, and the average
@@ -75,6 +88,7 @@ impl Problem<'_> {
         let Unknowns { whole, frames } = &fitted.unknowns;
         let covariance = &fitted.solution.covariance();
         let (turn, left_m) = (whole[WHOLE_HEADING], whole[WHOLE_ACROSS]);
+        let arms = arms_seen(&quality);
         let ends_m = [0, frames.len() - 1].map(|k| self.along(&frames[k]));
         let bent = self.bend.and_then(|bend| bend.moved(whole, self.route, ends_m));
         let route = bent.as_ref().unwrap_or(self.route);
@@ -87,7 +101,7 @@ impl Problem<'_> {
                 along_m: route.along(figure.posed.torso_centre.truncate(), frames[k][FRAME_ALONG]),
                 phase: frames[k][FRAME_PHASE],
                 posture: posture(&self.walker.gait, whole, &frames[k]),
-                measured: self.measured(fitted, covariance, k),
+                measured: self.measured(fitted, covariance, k, &arms),
                 sd: self.place_sd(fitted, covariance, k),
             };
             (frame, figure.feet())
@@ -153,7 +167,13 @@ impl Problem<'_> {
     }
 
     /// The angles of a frame that the pictures determine, with standard deviations.
-    fn measured(&self, fitted: &Fitted, covariance: &Covariance, frame: usize) -> [Measured; 2] {
+    fn measured(
+        &self,
+        fitted: &Fitted,
+        covariance: &Covariance,
+        frame: usize,
+        arms: &[[bool; JOINTS]; 2],
+    ) -> [Measured; 2] {
         let (unknowns, off) = (&fitted.unknowns, fitted.seen.off());
         let angles = unknowns::angles(&self.walker.gait, &unknowns.whole, &unknowns.frames[frame]);
         let forms = self.angle_forms(unknowns, frame);
@@ -162,7 +182,7 @@ impl Problem<'_> {
             let [sd, most] =
                 [SD_FACTOR * covariance.variance(whole, frames).sqrt(), MOST_SD_RAD[at % JOINTS]];
             let sd = sd.hypot(MODEL_SD_RAD[at % JOINTS]).hypot(OFF_SD_RAD * off);
-            (sd <= most).then_some([angles[at], sd])
+            (sd <= most && arms[at / JOINTS][at % JOINTS]).then_some([angles[at], sd])
         };
         [0, 1].map(|side| Measured { angles: std::array::from_fn(|joint| measured(side * JOINTS + joint)) })
     }

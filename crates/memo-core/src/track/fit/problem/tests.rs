@@ -4,13 +4,14 @@ use super::super::unknowns::{
     excess,
 };
 use super::cost::{importance, is_sole, robust};
-use super::outcome::Form;
+use super::outcome::{Form, arms_seen};
 use super::*;
 use crate::estimate::arrow::Arrow;
 use crate::image::Image;
 use crate::model::Body;
 use crate::model::body::Part;
 use crate::synth::scene::{SceneOptions, SynthScene, Truth};
+use crate::track::fit::{FitQuality, PartQuality};
 use crate::track::search::tests::{camera, walker};
 use glam::DVec3;
 use nalgebra::DVector;
@@ -352,6 +353,20 @@ fn contours_inside_the_body_and_of_shoes_count_less_than_the_outline() {
     let mut top = sample(Part::LeftThigh, true);
     top.point.z = 0.9;
     assert_eq!([importance(&top), of(Part::LeftThigh, true)], [0.3, 1.0]);
+}
+
+#[test]
+fn an_arm_that_the_model_misses_was_not_measured() {
+    let missing = |part: Part, missed: f64| {
+        let mut quality = FitQuality::default();
+        quality.parts[part as usize] = Some(PartQuality { share: 0.05, missed, residual_px: Some(1.5) });
+        arms_seen(&quality)
+    };
+    let all = [[true; JOINTS]; 2];
+    assert_eq!(missing(Part::RightForearm, 0.05), all);
+    assert_eq!(missing(Part::LeftHand, 0.9), all);
+    assert_eq!(missing(Part::RightForearm, 0.38), [[true, true, true, true, false], all[1]]);
+    assert_eq!(missing(Part::LeftUpperArm, 0.26), [all[0], [true, true, true, false, false]]);
 }
 
 /// Not the instep, the toes, the inner lines of a foot and the lower borders of other parts.
