@@ -36,6 +36,17 @@ def headless(scene):
     return scene.frames[:, int(shoulders.min()) + 15 :]
 
 
+@pytest.mark.parametrize("apart_s", [1.0, 40.0])
+def test_steps_are_not_counted_in_frames_that_are_far_apart(apart_s):
+    """As if one of the times of a video were in milliseconds, or its frame rate far too low."""
+    scene = memo.demo_scene(1)
+    times_s = apart_s * np.arange(len(scene.frames))
+    track = memo.track(scene.frames, times_s=times_s, height_m=scene.height_m)
+    assert not track.walks and {left.reason for left in track.left_out} == {"frames too far apart"}
+    assert f"the frames are {apart_s:.2g} s apart" in track.summary["message"]
+    assert "times are in seconds" in track.summary["message"]
+
+
 def test_who_is_followed_is_not_left_out(scene):
     track = tracked(scene.frames, scene, camera=scene.camera)
     assert len(track.walks) == 1
@@ -165,8 +176,12 @@ def test_a_point_where_nobody_is_finds_nobody(memo_command, tmp_path):
     assert abs(u_px - mean_u_px(scene)[frame]) < 25
     code, complained = followed(f"{place}@{frame}")
     assert code == Exit.TRACKED and "nobody" not in complained
-    code, complained = followed(f"{place}@100000")
+    code, complained = followed(f"{place}@0")
     assert code == Exit.NOBODY and "nor anywhere in this frame, but person 0 (frames " in complained
+    code, complained = followed(f"{place}@100000")
+    assert (
+        code == Exit.NOBODY and f"the frames that were read are 0 to {len(scene.frames) - 1}:" in complained
+    )
 
 
 def test_a_flickering_lamp_changes_little(scene):

@@ -13,6 +13,7 @@ from memo.plausible import (
     assumed_height_sentences,
     beside_sentences,
     contradiction_sentences,
+    has_usual_steps,
     implausible_sentences,
     measured_height_sentences,
     running_sentences,
@@ -118,7 +119,14 @@ def test_feet_off_the_ground_are_mentioned():
 def test_a_ratio_outside_its_limits_is_mentioned():
     for ratio, rate in ((0.0036, "high"), (0.0125, "low")):
         (said,) = implausible_sentences(walk(walk_ratio=_memo.WalkRatio(ratio, 0.004, 0.011)))
-        assert f"frame rate is too {rate}" in said and "4.0 to 11.0 mm" in said
+        assert f"frame rate is too {rate}" in said and "4.00 to 11.00 are usual" in said
+        assert f"{1000 * ratio:.2f} mm" in said
+
+
+def test_steps_that_few_people_take_may_be_counted_wrongly():
+    for ratio, is_usual in ((0.0036, False), (0.004, True), (0.011, True), (0.0125, False)):
+        assert has_usual_steps(walk(walk_ratio=_memo.WalkRatio(ratio, 0.004, 0.011))) == is_usual
+    assert has_usual_steps(walk(walk_ratio=None))
 
 
 def test_the_verdict_gives_its_reason():

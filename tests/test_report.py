@@ -292,7 +292,30 @@ def test_sides_that_may_be_swapped_are_not_judged(two_folders):
     written = report.path.read_text(encoding="utf-8")
     assert report.contents["sentences"] == ["No difference between the two walks can be told."]
     assert "left and right may be swapped (probability 40%)." in written
-    assert "not judged: left and right may be swapped" in written
+    assert "not judged: left and right, or the heading, may be wrong" in written
+
+
+def test_a_heading_that_may_be_mirrored_is_not_judged(two_folders):
+    for folder in two_folders:
+        table = read_track_csv(folder / "track.csv")
+        write_track_csv(folder / "track.csv", table | {"p_swapped": np.full(20, 0.01)})
+    run_file = two_folders[1] / "run.json"
+    run = json.loads(run_file.read_text())
+    for p, is_open in ((0.35, True), (0.1, False)):
+        run_file.write_text(json.dumps(run | {"walks": [{"p_other_heading": p}]}))
+        report = write_comparison(*two_folders)
+        said = "after: on the treadmill, the mirrored heading may be the true one (probability 35%)."
+        assert (said in report.contents["notes"]) == is_open
+        assert any("more flexed" in sentence for sentence in report.contents["sentences"]) != is_open
+
+
+def test_the_speed_of_who_walks_backwards_is_compared_by_its_size(two_folders):
+    for folder, speed in zip(two_folders, ("1.2,m/s,1.15,1.25", "-1.1,m/s,-1.14,-1.06"), strict=True):
+        table = folder / "gait_parameters.csv"
+        table.write_text(table.read_text() + f"0,speed,,{speed},4\n")
+    report = write_comparison(*two_folders)
+    assert "after: the person walks backwards." in report.contents["notes"]
+    assert "Speed: 0.100 m/s (0.036 to 0.164) smaller in B than in A." in report.contents["sentences"]
 
 
 def test_a_walk_that_the_model_does_not_fit_is_named(two_folders):

@@ -23,9 +23,12 @@ def test_over_ground_there_is_no_belt():
 def test_the_sentence_has_the_belt_and_a_likely_other_heading():
     said = treadmill_sentence(walk(1.204, 0.031, None, None), 8.04, 108.2)
     assert said == (
-        "Somebody walks on a treadmill for 8.0 s, belt speed 1.20 ± 0.03 m/s, 108 steps per minute."
+        "Somebody walks on a treadmill for 8.0 s, belt speed 1.20 m/s (standard deviation 0.03 m/s), "
+        "108 steps per minute."
     )
-    assert treadmill_sentence(walk(1.2, 0.03, -0.4, 0.01), 8.0, np.nan).endswith("± 0.03 m/s.")
+    assert treadmill_sentence(walk(1.2, 0.03, -0.4, 0.01), 8.0, np.nan).endswith(
+        "1.20 m/s (standard deviation 0.03 m/s)."
+    )
     open_heading = treadmill_sentence(walk(1.2, 0.03, -0.4, 0.31), 8.0, np.nan)
     assert "The heading is 23 degrees, or 337 degrees (probability 31%)." in open_heading
 

@@ -303,8 +303,41 @@ def test_what_is_not_a_video_is_named(tmp_path):
         assert "\n" not in str(caught.value)
 
 
-def write_image(path, luma):
-    write_pictures(path, [av.VideoFrame.from_ndarray(luma, format="gray")], "gray", "png")
+def write_image(path, luma, kind="gray", stored="gray"):
+    write_pictures(path, [av.VideoFrame.from_ndarray(luma, format=kind)], stored, "png")
+
+
+@pytest.mark.parametrize(
+    ("names", "frames", "absent"),
+    [
+        (("a_08", "a_09", "a_12", "a_13"), [0, 1, 4, 5], 2),
+        (("f0", "f10", "f20", "f40"), [0, 1, 2, 4], 1),
+        (("cam2_7", "cam2_8", "cam2_9"), [0, 1, 2], 0),
+        # No numbering: other texts, time stamps, and two numbers.
+        (("a1", "b2", "c9"), [0, 1, 2], 0),
+        (("t1712345", "t1712385", "t1712427", "t1712465"), [0, 1, 2, 3], 0),
+        (("a1_1", "a1_2", "a2_1", "a2_9"), [0, 1, 2, 3], 0),
+    ],
+)
+def test_images_that_are_missing_by_their_numbers_take_their_time(
+    tmp_path, luma_frames, names, frames, absent
+):
+    for name, luma in zip(names, luma_frames(count=len(names)), strict=True):
+        write_image(tmp_path / f"{name}.png", luma)
+    with VideoReader(tmp_path, rate_hz=25.0) as reader, warnings.catch_warnings():
+        warnings.simplefilter("ignore", VideoDamageWarning)
+        times_s = [frame.time_s for frame in reader]
+    np.testing.assert_allclose(times_s, np.array(frames) / 25.0)
+    assert (reader.damage is None) == (absent == 0)
+    assert absent == 0 or reader.damage.startswith("2 images are" if absent == 2 else "1 image is")
+
+
+@pytest.mark.parametrize(("most", "unused"), [(255, 8), (4095, 4), (65535, 0)])
+def test_bits_that_no_pixel_uses_are_counted(tmp_path, most, unused):
+    picture = np.linspace(0, most, 64 * 48).astype(np.uint16).reshape(48, 64)
+    write_image(tmp_path / "f0.png", picture, "gray16le", "gray16be")
+    with VideoReader(tmp_path, rate_hz=25.0) as reader:
+        assert reader.unused_bits == unused
 
 
 def test_a_folder_of_images_in_the_order_of_their_numbers(tmp_path, luma_frames):

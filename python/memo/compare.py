@@ -54,7 +54,10 @@ class ParameterDifference:
     @property
     def half(self) -> float:
         """Half the 95 % interval."""
-        halves = [(row["ci_high"] - row["ci_low"]) / 2 for row in (self.first, self.second)]
+        halves = [  # one end may be that of what is possible
+            np.maximum(row["ci_high"] - row["value"], row["value"] - row["ci_low"])
+            for row in (self.first, self.second)
+        ]
         return float(np.hypot(*halves))
 
     @property
@@ -109,6 +112,9 @@ def _rows(table: Table, walk: int) -> dict[tuple[str, str], dict[str, Any]]:
     found = {}
     for row in np.flatnonzero(table["walk"] == walk):
         line = {name: table[name][row] for name in GAIT_COLUMNS}
+        if line["parameter"] == "speed" and line["value"] < 0:  # backwards
+            ends = {"ci_low": -line["ci_high"], "ci_high": -line["ci_low"]}
+            line |= {"value": -line["value"], **ends}
         found[str(line["parameter"]), str(line["side"])] = line
     return found
 
@@ -154,6 +160,7 @@ def difference_sentences(
         said.append(
             f"The {curve.side} {curve.joint} is {abs(value):.0f}° ({abs(value) - half:.0f} to "
             f"{abs(value) + half:.0f}) {'more' if value > 0 else 'less'} flexed in {names[1]} than in "
-            f"{names[0]} at {percent}% of the cycle; its interval excludes zero for {curve.sure_share:.0%} of it."
+            f"{names[0]} at {percent}% of the cycle; its interval excludes zero for "
+            f"{curve.sure_share:.0%} of it."
         )
     return said or ["No difference between the two walks can be told."]

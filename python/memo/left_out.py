@@ -38,9 +38,9 @@ class LeftOut:
     """Up to 16 rows from the first frame to the last: frame, left, top, width and height, pixels."""
     reason: str
     """"cut off", "too small", "wrong size", "too wide", "too slow", "too fast", "not walking", "too brief",
-    "beside somebody", "too many" or "over ground"."""
+    "beside somebody", "too many", "frames too far apart" or "over ground"."""
     value: float | None
-    """The figure of the reason: height in pixels, speed in m/s, or a number of frames."""
+    """The figure of the reason: height in pixels, speed in m/s, seconds, or a number of frames."""
 
     @property
     def sentence(self) -> str:
@@ -118,6 +118,19 @@ def over_ground(left_out: Sequence[LeftOut]) -> str | None:
     return f"Nobody walks on a treadmill: somebody {_moved(max(moved, key=_metres))}"
 
 
+def too_far_apart(left_out: Sequence[LeftOut]) -> str | None:
+    """That steps cannot be followed in frames so far apart; None if nobody was left out for this."""
+    apart = [left for left in left_out if left.reason == "frames too far apart"]
+    return f"Nobody was seen walking: {_apart(apart[0])}" if apart else None
+
+
+def _apart(left: LeftOut) -> str:
+    return (
+        f"the frames are {left.value or 0:.2g} s apart, and steps can be followed only in frames that are at "
+        "most 0.25 s apart. Check the frame rate, and that times are in seconds."
+    )
+
+
 def _metres(left: LeftOut) -> float:
     return (left.value or 0.0) * (left.end_s - left.start_s)
 
@@ -143,5 +156,6 @@ _SENTENCES: dict[str, Callable[[LeftOut], str]] = {
     ),
     "beside somebody": lambda left: "it was not told apart from somebody who was followed there.",
     "too many": lambda left: "eight larger regions moved at the same time; no more are looked at.",
+    "frames too far apart": lambda left: _apart(left),
     "over ground": lambda left: f"somebody {_moved(left)}",
 }

@@ -15,6 +15,7 @@ __all__ = [
     "assumed_height_sentences",
     "beside_sentences",
     "contradiction_sentences",
+    "has_usual_steps",
     "implausible_sentences",
     "measured_height_sentences",
     "running_sentences",
@@ -115,18 +116,25 @@ def beside_sentences(walk: Walk) -> list[str]:
     ]
 
 
+def has_usual_steps(walk: Walk) -> bool:
+    """Whether step length and cadence go together as in people of this height; steps may be miscounted."""
+    ratio = walk.walk_ratio
+    return ratio is None or ratio.low <= ratio.value <= ratio.high
+
+
 def implausible_sentences(walk: Walk) -> list[str]:
     """Says that steps and cadence do not go together, or that the feet do not stand on the ground."""
     said = []
-    if walk.walk_ratio is not None:
+    if walk.walk_ratio is not None and not has_usual_steps(walk):
         ratio, least, most = walk.walk_ratio.value, walk.walk_ratio.low, walk.walk_ratio.high
-        if not least <= ratio <= most:
-            rate = "high" if ratio < least else "low"
-            said.append(
-                "People of this height do not walk so: their step length over cadence is "
-                f"{1000 * least:.1f} to {1000 * most:.1f} mm per step per minute, not {1000 * ratio:.1f}. "
-                f"Perhaps the frame rate is too {rate}."
-            )
+        why = "the frame rate is too high, or the steps are short and quick"
+        if ratio > most:
+            why = "the frame rate is too low, or the person walks unusually slowly"
+        said.append(
+            "Few people of this height walk so: the step length over cadence is "
+            f"{1000 * ratio:.2f} mm per step per minute, and {1000 * least:.2f} to {1000 * most:.2f} are "
+            f"usual. Perhaps {why}."
+        )
     if walk.fit is not None and walk.fit.is_off_ground and walk.fit.sole_m is not None:
         where = "above" if walk.fit.sole_m > 0 else "below"
         said.append(f"The feet are {100 * abs(walk.fit.sole_m):.0f} cm {where} the ground: check the camera.")

@@ -57,6 +57,8 @@ _DRAWN = (
     "comparison.html",
 )
 _LARGEST_PX = 1920  # longest tested side; for a walk enlarged to 2560 or more, the facing direction was wrong
+# So many unused bits are of a recording with fewer bits, or of a scene an eighth as bright as it could be.
+_FEW_BITS = 3
 _OF_A_WALK = ("message", "start_s", "end_s", "direction", "gait", "p_swapped")
 
 Progress = Callable[[str, int, "int | None"], object]
@@ -353,6 +355,11 @@ def _doubts(reader: VideoReader, camera_given: bool) -> Iterator[str]:
             f"{width}x{height} pixels are more than memo was tested on: the direction in which the person "
             "faces and which leg is which may be wrong; leave --shrink out"
         )
+    if reader.unused_bits >= _FEW_BITS:
+        yield (
+            f"no pixel of the first frame uses the upper {reader.unused_bits} bits of its values: if the "
+            "recording has fewer bits, scale it to the full range, or it is taken to be nearly black"
+        )
     if not camera_given and reader.pixel_aspect != 1:
         yield f"pixels are {reader.pixel_aspect:.3f} times as wide as high; give a --camera"
 
@@ -372,7 +379,7 @@ def _recorded(
     if followed is not None:
         track = track.of_person(followed)
     elif point is not None:
-        not_there = _not_there(track, point, first_frame)
+        not_there = _not_there(track, point, first_frame, frames_read)
     track.camera_motion = replace(track.camera_motion, first_frame=first_frame)
     track.left_out = [left.of_video(1, first_frame) for left in track.left_out]
 
@@ -404,9 +411,12 @@ def _recorded(
     )
 
 
-def _not_there(track: Track, point: Point, first_frame: int) -> str:
+def _not_there(track: Track, point: Point, first_frame: int, frames_read: int) -> str:
     """Says who was tracked in the frame of a point where nobody was, and where."""
     said = f"nobody was tracked at {point.u_px:g},{point.v_px:g}@{point.frame}"
+    if not first_frame <= point.frame < first_frame + frames_read:
+        read = f"the frames that were read are {first_frame} to {first_frame + frames_read - 1}"
+        return f"{said}, as {read}: the results are those of everybody"
     if not len(track):
         return said
     columns, middles = track.columns, []

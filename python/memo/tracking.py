@@ -16,7 +16,7 @@ from memo.camera_motion import CameraMotion
 from memo.cycles import cycle_table, departure_sentences
 from memo.files import EVENT_COLUMNS, TRACK_COLUMNS
 from memo.gait import cadence_sentences, gait_table, lookup, symmetry_sentences
-from memo.left_out import LeftOut, left_out_sentences, over_ground
+from memo.left_out import LeftOut, left_out_sentences, over_ground, too_far_apart
 from memo.notebook import table
 from memo.pixels import camera_of_video, columns_of_video, of_video
 from memo.plausible import (
@@ -24,6 +24,7 @@ from memo.plausible import (
     assumed_height_sentences,
     beside_sentences,
     contradiction_sentences,
+    has_usual_steps,
     implausible_sentences,
     measured_height_sentences,
     running_sentences,
@@ -434,7 +435,7 @@ class Track:
             if walk.p_swapped > LIKELY_MISTAKEN:
                 chance = f"probability {walk.p_swapped:.0%}"
                 told.append(f"Left and right may be swapped ({chance}): check them before use.")
-            if _is_in_place(walk):
+            if _is_in_place(walk) and has_usual_steps(walk):
                 told += [] if unseen else symmetry_sentences(self.gait_parameters, index)
                 is_sure = walk.p_swapped <= LIKELY_MISTAKEN and not is_heading_open(walk)
                 told += departure_sentences(walk.departures) if is_sure else []
@@ -482,6 +483,7 @@ class Track:
                 "direction": self._way(walk),
                 "gait": walk.direction,
                 "p_swapped": walk.p_swapped,
+                "p_other_heading": walk.treadmill.p_other_heading if walk.treadmill else None,
                 "person": person,
                 "fit": _fit(walk),
                 **walk.record,
@@ -630,8 +632,8 @@ class Track:
         return "nobody"
 
     def _nobody_message(self) -> str:
-        if moved := over_ground(self.left_out):
-            return moved
+        if known := over_ground(self.left_out) or too_far_apart(self.left_out):
+            return known
         moving, needed = self.seek_report.frames_with_candidate, int(self._options["start_frames"])
         why = self._why_nobody()
         if why == "nobody" and 0 < moving < needed:

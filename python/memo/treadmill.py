@@ -38,7 +38,8 @@ def treadmill_sentence(walk: Walk, seconds: float, cadence: float) -> str:
     found = walk.treadmill
     assert found is not None
     steps = f", {cadence:.0f} steps per minute" if np.isfinite(cadence) else ""
-    pace = f"belt speed {found.belt_mps:.2f} \u00b1 {found.belt_sd_mps:.2f} m/s{steps}"
+    sd = f"standard deviation {found.belt_sd_mps:.2f} m/s"
+    pace = f"belt speed {found.belt_mps:.2f} m/s ({sd}){steps}"
     said = f"Somebody walks on a treadmill for {seconds:.1f} s, {pace}."
     if is_heading_open(walk):
         assert found.other_heading_rad is not None

@@ -15,7 +15,7 @@ import re
 import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import chain
+from itertools import chain, pairwise
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -94,6 +94,8 @@ class VideoReader:
             self._first = next(self._decoded, None)
             if self._first is None:
                 raise VideoError(f"{self.path}: no frame of it can be decoded")
+            self.unused_bits: int = _unused_bits(self._first)
+            """Upper bits that no pixel of the first frame uses: 4 for values of 12 bits in 16."""
             height, width = _upright(_luma(self._first), self._first).shape
             self.shrink: int = -(-max(width, height) // _LONGEST_PX) if shrink is None else shrink
             """Pixels of the video per pixel of a frame, along each axis."""
@@ -157,7 +159,7 @@ class VideoReader:
         time_s = -step_s
         for index, decoded in enumerate(chain([first], self._decoded)):
             if self._rate_hz is not None:
-                stamp_s = index * step_s
+                stamp_s = (index if self._source.place is None else self._source.place) * step_s
             elif decoded.time is None or first.time is None:
                 stamp_s = -1.0
             else:
@@ -181,6 +183,9 @@ class VideoReader:
             self.damage = (
                 f"{counted(undecodable, 'piece')} could not be decoded; {counted(read, 'frame')} could"
             )
+        elif self._source.absent:
+            absent = counted(self._source.absent, "image is", "images are")
+            self.damage = f"{absent} missing by the numbers in the names; the others keep their times"
         elif self._source.counted and missing > _MISSING_FRAMES_TOLERATED:
             self.damage = f"cut off: its header says {counted(announced or 0, 'frame')}, {read} could be read"
         if self.damage:
@@ -206,7 +211,8 @@ class _File:
             self._container.close()
             raise VideoError(f"{path}: no decoder for its video stream")
         self._stream.thread_type = "AUTO"
-        self.undecodable = 0
+        self.undecodable = self.absent = 0
+        self.place: int | None = None
         self.counted = self._stream.frames > 0
         self.rate_hz = float(self._stream.average_rate or self._stream.guessed_rate or 25)
         self.announced = self._stream.frames or self._frames_from_duration()
@@ -254,13 +260,20 @@ class _Folder:
             raise VideoError(f"{path}: a folder without images")
         if rate_hz is None:
             raise VideoError(f"{path}: a folder of images has no time stamps; give its frame rate")
-        self._images = iter(sorted(names, key=_natural_order))
+        names.sort(key=_natural_order)
+        places = _places(names)
+        self._images = iter(zip(places, names, strict=True))
+        self.place: int | None = None
+        """Which frame of the recording the latest image is, by its number."""
+        self.absent = places[-1] + 1 - len(names)
+        """Images that are missing between the first and the last."""
         self.announced = len(names)
         self.rate_hz = rate_hz
         self.undecodable = 0
 
     def decoded(self) -> Iterator[av.VideoFrame]:
-        for image in self._images:
+        for place, image in self._images:
+            self.place = place
             file = _File(image)
             try:
                 yield from file.decoded()
@@ -277,7 +290,7 @@ def _open_source(path: Path, rate_hz: float | None) -> _File | _Folder:
         return _Folder(path, rate_hz)
     if not path.exists():
         raise VideoError(nothing_at(path))
-    if path.stat().st_size == 0:
+    if path.is_file() and path.stat().st_size == 0:
         raise VideoError(f"{path}: the file is empty")
     return _File(path)
 
@@ -285,6 +298,28 @@ def _open_source(path: Path, rate_hz: float | None) -> _File | _Folder:
 def _natural_order(path: Path) -> list[tuple[int, str]]:
     """Sorts frame9 before frame10."""
     return [(int(digits or 0), text) for text, digits in re.findall(r"(\D*)(\d*)", path.name)]
+
+
+def _places(names: list[Path]) -> list[int]:
+    """Which frames of the recording sorted images are: some are missing where the numbers in the names jump.
+
+    Gaps are known if one number changes, mostly by the same step.
+    """
+    orders = [_natural_order(path) for path in names]
+    in_order = list(range(len(names)))
+    if len(orders) < 3 or len({tuple(text for _, text in order) for order in orders}) > 1:
+        return in_order
+    numbers = [
+        list(column) for column in zip(*([number for number, _ in order] for order in orders), strict=True)
+    ]
+    changing = [column for column in numbers if len(set(column)) > 1]
+    if len(changing) != 1:
+        return in_order
+    steps = [after - before for before, after in pairwise(changing[0])]
+    usual = max(set(steps), key=steps.count)
+    if usual <= 0 or 2 * steps.count(usual) < len(steps) or any(step % usual for step in steps):
+        return in_order
+    return [(number - changing[0][0]) // usual for number in changing[0]]
 
 
 def _luma(decoded: av.VideoFrame) -> Luma:
@@ -303,6 +338,13 @@ def _luma(decoded: av.VideoFrame) -> Luma:
     rows = np.frombuffer(memoryview(plane), np.uint8).reshape(-1, plane.line_size)
     luma: Luma = rows[: decoded.height, : decoded.width]
     return _LIMITED[luma] if is_full else luma
+
+
+def _unused_bits(decoded: av.VideoFrame) -> int:
+    first = decoded.format.components[0]
+    if first.bits <= 8 or decoded.format.name not in ("gray16le", "gray16be", "rgb48le", "rgb48be"):
+        return 0
+    return first.bits - int(decoded.to_ndarray().max()).bit_length()
 
 
 def _is_full_range(decoded: av.VideoFrame) -> bool:

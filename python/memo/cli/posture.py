@@ -312,7 +312,8 @@ def _scale_line(postures: memo.Postures) -> str:
         sources = [source for source, there in zip(postures.anchor_source, known, strict=True) if there]
         usual = max(dict.fromkeys(sources), key=sources.count)
         distance_m, sd_m = np.median(postures.anchor_m[known]), np.median(postures.anchor_sd_m[known])
-        line += f"; the neck is {distance_m:.2f} ± {sd_m:.2f} m away, {_SOURCES.get(usual, usual)}"
+        sd = f"standard deviation {sd_m:.2f} m"
+        line += f"; the neck is {distance_m:.2f} m away ({sd}), {_SOURCES.get(usual, usual)}"
     if postures.camera_assumed:
         line += "; no --camera, so a level one is assumed: if it was tilted, so are the postures"
     return f"{line}."

@@ -44,7 +44,8 @@ def comparison_page(
     parameters = parameter_differences(runs[0].parameters, runs[1].parameters, chosen)
     curves = curve_differences(runs[0].cycles, runs[1].cycles, chosen)
     are_sides_sure = all(
-        _p_swapped(run, walk) <= LIKELY_MISTAKEN for run, walk in zip(runs, chosen, strict=True)
+        max(_p_swapped(run, walk), run.p_other_heading(walk)) <= LIKELY_MISTAKEN
+        for run, walk in zip(runs, chosen, strict=True)
     )
     sentences = difference_sentences(("A", "B"), parameters, curves if are_sides_sure else [])
     notes = [note for run, walk in zip(runs, chosen, strict=True) for note in _doubts(run, walk)]
@@ -98,11 +99,19 @@ def _p_swapped(run: RunFolder, walk: int) -> float:
 def _doubts(run: RunFolder, walk: int) -> list[str]:
     p_swapped = _p_swapped(run, walk)
     told = []
+    rows = (run.parameters["walk"] == walk) & (run.parameters["parameter"] == "speed")
+    if (run.parameters["value"][rows] < 0).any():
+        told.append(f"{_name(run, walk)}: the person walks backwards.")
     verdict = run.verdict(walk)
     if verdict not in (None, "well", "not measured"):
         told.append(f"{_name(run, walk)}: the model fits the person {verdict}; check its overlay before use.")
     if p_swapped > LIKELY_MISTAKEN:
         told.append(f"{_name(run, walk)}: left and right may be swapped (probability {p_swapped:.0%}).")
+    if run.p_other_heading(walk) > LIKELY_MISTAKEN:
+        chance = f"probability {run.p_other_heading(walk):.0%}"
+        told.append(
+            f"{_name(run, walk)}: on the treadmill, the mirrored heading may be the true one ({chance})."
+        )
     if not (run.cycles["walk"] == walk).any():
         told.append(f"{_name(run, walk)}: it has no measured gait cycles.")
     return told
@@ -157,7 +166,7 @@ def _curve_table(curves: list[CurveDifference], are_sides_sure: bool) -> str:
 
 def _largest(curve: CurveDifference, are_sides_sure: bool) -> str:
     if not are_sides_sure:
-        return "not judged: left and right may be swapped"
+        return "not judged: left and right, or the heading, may be wrong"
     if curve.joint not in JUDGED:
         return "not judged: its errors are larger than stated"
     if not curve.is_sure:

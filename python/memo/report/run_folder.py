@@ -73,6 +73,12 @@ class RunFolder:
         fit = walks[walk].get("fit") if 0 <= walk < len(walks) else None
         return fit if isinstance(fit, dict) else {}
 
+    def p_other_heading(self, walk: int) -> float:
+        """The probability that a walk on a treadmill has the mirrored heading; 0 where there is none."""
+        walks = self.run.get("walks") or []
+        known = walks[walk].get("p_other_heading") if 0 <= walk < len(walks) else None
+        return float(known or 0.0)
+
     def verdict(self, walk: int) -> str | None:
         """How well the model fits the person: `well`, `in part`, `poorly` or `not measured`; None in results
         of older versions."""
