@@ -67,8 +67,10 @@ DEFINITIONS: dict[str, str] = {
     "model's foot does not), and by side 6.5 ms of that side's own.",
     "swing": "Share of the cycle in which a foot is off the ground, 100 - stance.",
     "single_support": "Share of the cycle in which one foot alone is on the ground, 100 - double_support; by "
-    "side, in which that foot is, the other's swing.",
-    "double_support": "Share of the cycle in which both feet are on the ground, 2 stance - 100.",
+    "side, in which that foot is, the other's swing. Without a side it is the sum of both sides; stance and "
+    "swing are their means.",
+    "double_support": "Share of the cycle in which both feet are on the ground, 2 stance - 100; empty where "
+    "that is below 0.",
     "hip_range": "Range of the thigh's angle against the vertical over at least one cycle, degrees.",
     "knee_range": "Range of the knee's flexion over at least one cycle, degrees.",
     "knee_peak": "Largest flexion of the knee, degrees.",
