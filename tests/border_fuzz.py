@@ -1020,6 +1020,7 @@ def results():
             0.004,
             False,
             False,
+            False,
             "well",
             {"head": 0.02, "left shank": 0.3},
             {"head": 0.5},

@@ -411,6 +411,18 @@ def test_points_are_taken_as_numpy_takes_them():
             camera.ground_points(wrong)
 
 
+def test_four_points_on_the_floor_have_deviations_that_hold():
+    """One equation more than unknowns: the residual alone says little of the noise."""
+    truth = memo.Camera.level((640, 480), 49.0, 1.3, 6.0)
+    places = np.array([[-1.2, -0.5, 0.0], [1.3, -0.4, 0.0], [1.1, 2.1, 0.0], [-1.0, 2.4, 0.0]])
+    rng, off = np.random.default_rng(3), []
+    for _ in range(60):
+        pixels = truth.project(places) + rng.normal(0, 0.5, (4, 2))
+        value, sd = memo.calibrate_points(places, pixels, (640, 480)).estimates["focal_px"]
+        off.append(abs(value - truth.matrix[0, 0]) / sd)
+    assert np.mean(np.array(off) > 3) <= 0.05 and np.median(off) > 0.2
+
+
 # Checkerboards.
 
 
@@ -462,6 +474,19 @@ def test_rendered_boards(memo_command, tmp_path):
     )
     code, _, complaint = memo_command(*arguments, "--squares", "5x4")
     assert code == 1 and complaint.count("\n") == 1  # too few boards, or corners too near to one another
+
+
+def test_boards_that_are_hardly_tilted_are_refused(memo_command, tmp_path):
+    folder = tmp_path / "boards"
+    folder.mkdir()
+    for i, (x, y) in enumerate([(0.004, 0.0), (0.012, 0.0), (-0.01, 0.008), (0.0, -0.012), (0.008, 0.01)]):
+        middle = np.array([0.12, 0.075, 0.0])
+        luma = rendered_board(look_at(middle + np.array([x, y, 0.4]), middle))
+        cv2.imwrite(str(folder / f"board{i}.png"), luma)
+    arguments = ("calibrate", "checkerboard", folder, "--squares", "10x7", "--square-mm", 30)
+    code, _, complaint = memo_command(*arguments, "--out", tmp_path / "out")
+    assert code == 1 and "tilts differ by up to" in complaint and "20 degrees or more" in complaint
+    assert not (tmp_path / "out" / "lens.toml").exists()
 
 
 def test_the_ground_is_drawn(tmp_path):

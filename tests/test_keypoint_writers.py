@@ -7,7 +7,7 @@ import memo
 import numpy as np
 import pandas as pd
 import pytest
-from detector_files import SPORTS2D, trc_text
+from detector_files import SPORTS2D, deeplabcut, trc_text
 from memo.files import TRACK_COLUMNS, write_track_csv
 from memo.formats.parquet import write_parquet
 from memo.keypoints import (
@@ -416,3 +416,9 @@ def test_unswap_of_parquet_needs_a_format(tmp_path, memo_command):
         "unswap", tmp_path / "track.parquet", "--format", "csv", "--out", tmp_path / "out"
     )
     assert code == 0 and len(read_keypoints(tmp_path / "out" / "track.csv").names) == 12
+
+
+def test_convert_says_that_others_are_left_out(tmp_path, memo_command):
+    deeplabcut(tmp_path / "two.csv", individuals=("anna", "ben"))
+    code, said, _ = memo_command("convert", tmp_path / "two.csv", tmp_path / "one.json", "--fps", 30)
+    assert code == 0 and "Only the most prominent person was written: 1 other person is in " in said

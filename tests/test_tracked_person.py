@@ -148,9 +148,9 @@ def test_the_command_takes_a_track(tmp_path, memo_command):
     code, said, complaint = memo_command(*arguments)
     assert code == 0, complaint
     assert "Sizes are based on the height of the tracked walk; the neck is " in said
-    assert " m away, from the track." in said
+    assert " m), from the track." in said
     code, said, _ = memo_command(*arguments, "--height", 1.5)
-    assert "Sizes are based on the height given; the neck is " in said and " m away, from the track." in said
+    assert "Sizes are based on the height given; the neck is " in said and " m), from the track." in said
     assert (
         "the height given, 1.50 m, and that of the tracked walk, 1.80 m, differ by more than three standard "
         "deviations (0.03 m)"

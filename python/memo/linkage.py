@@ -64,6 +64,9 @@ _SHORT = {
 }
 
 
+# As `min_weight` of `memo.posture`.
+_LEAST_SCORE = 0.2
+
 JOINT_NAMES = frozenset(_SHORT.values())
 """Names of joints that `read_points_csv` gives to points."""
 
@@ -72,13 +75,20 @@ JOINT_NAMES = frozenset(_SHORT.values())
 class Points:
     """Points over time: `positions` (T, K, 2) pixels or (T, K, 3) metres, NaN for unseen points.
 
-    `scales` (T,): scale of each frame, if a person approaches or recedes.
+    `scales` (T,): scale of each frame, if a person approaches or recedes. `frames` (T,): their numbers in the
+    source, if they do not count from 0.
     """
 
     names: list[str]
     times_s: Array
     positions: Array
     scales: Array | None = None
+    frames: npt.NDArray[np.int64] | None = None
+
+    @property
+    def numbers(self) -> list[int]:
+        """The numbers of the frames."""
+        return list(range(len(self.times_s))) if self.frames is None else self.frames.tolist()
 
     def __repr__(self) -> str:
         frames, count, dimensions = self.positions.shape
@@ -237,7 +247,12 @@ def read_points_csv(path: str | PathLike[str], dimensions: int, rate_hz: float |
     table = read_number_table(path)
     names, positions = table.points(dimensions)
     scales = table.numbers[:, table.column["scale"]] if "scale" in table.column else None
-    return Points([_SHORT.get(name, name) for name in names], table.times_s(rate_hz), positions, scales)
+    frames = None
+    if "frame" in table.column:
+        numbers = table.numbers[:, table.column["frame"]]
+        frames = numbers.astype(np.int64) if np.isfinite(numbers).all() else None
+    names = [_SHORT.get(name, name) for name in names]
+    return Points(names, table.times_s(rate_hz), positions, scales, frames)
 
 
 def read_tracks(path: str | PathLike[str], rate_hz: float | None = None) -> Points:
@@ -258,7 +273,10 @@ def read_tracks(path: str | PathLike[str], rate_hz: float | None = None) -> Poin
 
 
 def limb_points(keypoints: Keypoints) -> Points:
-    """The shoulders, elbows, wrists, hips, knees and ankles of one person."""
+    """The shoulders, elbows, wrists, hips, knees and ankles of one person.
+
+    Points with a score below 0.2 are taken as missing, as in `memo.posture`.
+    """
     limbs = [name for name in keypoints.names if name in _SHORT]
     if len(limbs) < 2:
         raise ValueError(
@@ -266,7 +284,10 @@ def limb_points(keypoints: Keypoints) -> Points:
             f"it has {', '.join(keypoints.names)}"
         )
     places = [keypoints.names.index(name) for name in limbs]
-    return Points([_SHORT[name] for name in limbs], keypoints.times_s, keypoints.points[:, places])
+    is_seen = keypoints.scores[:, places] >= _LEAST_SCORE
+    seen = np.where(is_seen[..., None], keypoints.points[:, places], np.nan)
+    names = [_SHORT[name] for name in limbs]
+    return Points(names, keypoints.times_s, seen, frames=np.asarray(keypoints.frames, np.int64))
 
 
 def holds_keypoints(path: Path) -> bool:
@@ -290,7 +311,7 @@ def write_points_csv(path: str | PathLike[str], points: Points) -> None:
     header = ["frame", "time_s", *(f"{name}_{axis}" for name in points.names for axis in axes)]
     rows = [
         [str(frame), f"{time_s:.6f}", *_cells(row.ravel())]
-        for frame, (time_s, row) in enumerate(zip(points.times_s, points.positions, strict=True))
+        for frame, time_s, row in zip(points.numbers, points.times_s, points.positions, strict=True)
     ]
     if points.scales is not None:
         header.append("scale")
@@ -341,8 +362,8 @@ def write_figure_csv(out: Path, figure: PlanarFigure, points: Points) -> list[Pa
     space = np.concatenate([points.positions, figure.depth[..., None]], axis=2)
     header = ["frame", "time_s", "source", *(f"{n}_{axis}_px" for n in points.names for axis in "uvz")]
     rows = (
-        [str(frame), f"{points.times_s[frame]:.6f}", figure.sources[frame], *_cells(space[frame].ravel())]
-        for frame in range(len(space))
+        [str(number), f"{points.times_s[row]:.6f}", figure.sources[row], *_cells(space[row].ravel())]
+        for row, number in enumerate(points.numbers)
     )
     write_table(written[3], header, rows)
     return written

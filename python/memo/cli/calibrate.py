@@ -48,6 +48,8 @@ CHECKERBOARD_EPILOG = f"""Examples:
 {EXIT_CODES}"""
 
 _KEYPOINT_SUFFIXES = (".json", ".csv", ".trc", ".parquet")
+_LARGE_ERROR = 0.01  # of the longer side: points are pointed at to a few pixels
+_FAR_OFF = 0.2  # of the longer side, for a principal point: few pictures are cut out so far off their centre
 _WIDEST_M = 500.0  # largest plausible spread of the points of one camera
 _MOST_FRAMES = 150  # enough for a background; all are in memory at once
 
@@ -221,10 +223,22 @@ def _points(path: Path, view: dict[str, Any], delivery: Delivery) -> Exit:
     if found.is_planar and view["lens"] is None:
         lines.append("All points lie in a plane: square pixels were assumed.")
     if "centre_u_px" not in found.estimates and view["lens"] is None:
-        lines.append("The principal point is the picture's centre; the points do not contradict it.")
+        contradicted = "" if view["focal_px"] is not None else "; the points do not contradict it"
+        lines.append(f"The principal point is the picture's centre{contradicted}.")
+    if found.rms_px > _LARGE_ERROR * max(view["size"]):
+        lines.append("This error is large: check the points, their axes and units, --size and --fov-deg.")
+    if (share := _centre_off(found, view["size"])) > _FAR_OFF:
+        lines.append(f"The principal point is {share:.0%} of the picture off its centre: check --size.")
     marks = np.stack([table.pixels, table.pixels + found.residuals_px], axis=1)
     summary = {"points": len(off), "left_out_lines": [table.lines[i] for i in found.outliers]}
     return _deliver(found, view, lines, summary, marks, delivery)
+
+
+def _centre_off(found: Any, size: tuple[int, int]) -> float:
+    """How far a fitted principal point is off the picture's centre, as a share of the longer side."""
+    fitted = [found.estimates.get(f"centre_{axis}_px") for axis in "uv"]
+    offs = [0.0 if one is None else one[0] - (side - 1) / 2 for one, side in zip(fitted, size, strict=True)]
+    return math.hypot(*offs) / max(size)
 
 
 def _walker(
@@ -401,6 +415,8 @@ def _deliver(
         else ("The picture shows no ground on which a person could stand: are the axes right?")
     )
     said = [f"{where} {'down' if pitch_deg >= 0 else 'up'}.", f"Fitted: {fitted}.", size]
+    if z < 0:
+        said.insert(1, "That is below the ground: z_m must point upwards, from 0 at the floor.")
     summary = {
         **summary,
         "estimates": estimates,

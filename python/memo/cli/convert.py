@@ -219,6 +219,9 @@ def _convert_picture(
         keypoints = keypoints_of(source, {"fps": fps, "image_size": size_of(image_size)})
         left_out = write_keypoints(target, keypoints, "coco" if target.suffix else "openpose")
         notes = [f"Left out, the format cannot store them: {', '.join(left_out)}."] if left_out else []
+        if len(keypoints.everyone) > 1:
+            others = counted(len(keypoints.everyone) - 1, "other person is", "other people are")
+            notes.append(f"Only the most prominent person was written: {others} in {source}.")
         summary = {"frames": len(keypoints.frames), "points": list(keypoints.names), "notes": notes}
         told = f"{counted(len(keypoints.frames), 'frame')}, {counted(len(keypoints.names), 'point')}"
     summary = {"source": str(source), "target": str(target), **summary}

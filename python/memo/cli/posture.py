@@ -280,8 +280,9 @@ def _frames_line(postures: memo.Postures) -> str:
     if breaking:
         line += f"; in {counted(breaking, 'frame')} the chosen posture breaks a constraint"
         line += f" ({_most_broken(postures)})"
-    if postures.repair is not None and any(postures.repair.exchanged.values()):
-        line += f"; right and left were exchanged: {exchanges(postures.repair)}"
+    repair = postures.repair
+    if repair is not None and any((*repair.exchanged.values(), *repair.guessed.values())):
+        line += f"; right and left were exchanged: {exchanges(repair)}"
     return f"{line}."
 
 

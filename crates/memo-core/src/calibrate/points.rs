@@ -9,7 +9,7 @@
 //!    1989) improves by a margin; otherwise the principal point is the image centre and the lens has no
 //!    distortion.
 //!
-//! The standard deviation of a pixel coordinate is estimated from the residuals. The covariance is that of
+//! The standard deviation of a pixel coordinate is estimated from the residuals and one more of a pixel. The covariance is that of
 //! the fit alone: it assumes that pixels are square and that the distortion is no more than k1, k2.
 //!
 //! Limits: points in one plane do not determine the focal length if the camera looks straight at the plane. A
@@ -36,6 +36,8 @@ const NEEDED_IN_PLANE: usize = 4;
 const FLAT: f64 = 1e-4;
 /// Lower bound of the noise in the test of what the points determine, pixels.
 const LEAST_NOISE_PX: f64 = 0.5;
+/// How well pixels are usually pointed at by hand.
+const USUAL_NOISE_PX: f64 = 1.0;
 /// An additional parameter must lower Akaike's criterion by this much (odds of 20 to 1).
 const MARGIN: f64 = 6.0;
 /// Largest accepted coordinate, metres or pixels.
@@ -160,7 +162,7 @@ pub struct PointCalibration {
     pub outliers: Vec<usize>,
     /// Root mean square distance between projected and given pixels, over the points not left out.
     pub rms_px: f64,
-    /// Standard deviation of a pixel coordinate, estimated from the residuals, pixels.
+    /// Standard deviation of a pixel coordinate, estimated from the residuals and one more of a pixel, pixels.
     pub noise_px: f64,
     /// Number of equations minus number of unknowns.
     pub degrees_of_freedom: usize,
@@ -594,7 +596,11 @@ impl<'a> Problem<'a> {
             }
         }
         let unit = unit.ok_or(PointError::Undetermined)?;
-        let noise_px = if freedom > 0 { noise_px(&found) } else { f64::NAN };
+        // With few residuals more than points need, these may be small by chance: they count beside one of a pixel.
+        let noise_px = match freedom {
+            0 => f64::NAN,
+            _ => ((found.fit.sum_sq() + USUAL_NOISE_PX.powi(2)) / (freedom + 1) as f64).sqrt(),
+        };
         let covariance = unit * (noise_px * noise_px);
         let camera = self.camera(&found.state).validated()?;
         let residual = |point: usize| {

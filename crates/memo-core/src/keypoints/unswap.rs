@@ -431,7 +431,31 @@ impl<'a> Limb<'a> {
         let posterior = chain.posterior();
         let motion_only = Chain::new(self.levels, &steps, Prior { as_is: 0.0, ..prior });
         let starts = motion_only.runs(&path, &motion_only.posterior(), RUN_SURE, RUN_PATIENCE);
-        Solution { scales, costs, path, posterior, starts }
+        let mut solution = Solution { scales, costs, path, posterior, starts };
+        self.turn_unlikely_runs(&mut solution);
+        solution
+    }
+
+    /// Exchanges the sides of whole runs whose labels are likelier the other way: the likeliest sequence is one of many, and
+    /// how runs go together is known least.
+    fn turn_unlikely_runs(&self, solution: &mut Solution) {
+        for run in 0..solution.starts.len() {
+            let steps = self.steps_of(solution, run);
+            if self.mean_probability(solution, steps.clone()) < 0.5 {
+                solution.path[steps].iter_mut().for_each(|bits| *bits ^= (1 << self.levels) - 1);
+            }
+        }
+    }
+
+    /// The steps of a run.
+    fn steps_of(&self, solution: &Solution, run: usize) -> std::ops::Range<usize> {
+        solution.starts[run]..solution.starts.get(run + 1).copied().unwrap_or(self.shown.len())
+    }
+
+    /// Mean posterior probability of the labels on the path.
+    fn mean_probability(&self, solution: &Solution, steps: std::ops::Range<usize>) -> f64 {
+        let count = steps.len() as f64;
+        steps.map(|k| self.probability_of_path(solution, k, self.furthest(k).0)).sum::<f64>() / count
     }
 
     /// Costs per step and level, from the last two frames of the level; zero where they do not exist yet.
@@ -487,16 +511,11 @@ impl<'a> Limb<'a> {
     fn runs(&self, solution: &Solution) -> Vec<FrameRun> {
         let starts = &solution.starts;
         let run = |(i, &first): (usize, &usize)| {
-            let after = starts.get(i + 1).copied().unwrap_or(self.shown.len());
-            let right = (first..after).map(|k| {
-                let (level, _) = self.furthest(k);
-                self.probability_of_path(solution, k, level)
-            });
             let end = starts.get(i + 1).map_or(self.times_s.len(), |&next| self.shown[next].0);
             FrameRun {
                 start: if i == 0 { 0 } else { self.shown[first].0 },
                 end,
-                probability: right.sum::<f64>() / (after - first) as f64,
+                probability: self.mean_probability(solution, self.steps_of(solution, i)),
                 gap_before_s: self.gap_before(first),
             }
         };

@@ -86,6 +86,9 @@ const MIDDLE_OF_STANCE: [f64; 2] = [0.1, 0.4];
 /// Standard deviation over people of the speed at the same cadence, as a share of it.
 const AVERAGE_GAIT_SHARE: f64 = 0.15;
 
+/// Who moves farther in the frames of a start is not on a treadmill, whatever is said, metres.
+const LONGEST_DRIFT_M: f64 = 1.0;
+
 /// What a start on the spot needs besides the frames.
 pub(super) struct Spot<'a> {
     pub(super) camera: Camera,
@@ -104,8 +107,12 @@ impl Spot<'_> {
     /// Starts a walk on the spot; `None` if the thing moves on, or if its legs do not walk.
     pub(super) fn begin(&self, standing: Standing) -> Result<Active, Standing> {
         let is_forced = self.options.treadmill == Some(true);
-        let moves_on = |course: &Course| course.speed_mps >= SLOWEST_MPS;
-        if self.courses.first().is_none_or(moves_on) && !is_forced {
+        let moves_on = |course: &Course| match is_forced {
+            // Belts are short.
+            true => course.speed_mps * standing.lasts_s() > LONGEST_DRIFT_M,
+            false => course.speed_mps >= SLOWEST_MPS,
+        };
+        if self.courses.first().is_none_or(moves_on) {
             return Err(standing);
         }
         let frames: Vec<&FrameEdges> = standing.kept.iter().map(|(_, edges)| edges).step_by(EVERY).collect();
@@ -308,6 +315,7 @@ mod tests {
     #[test]
     fn what_moves_on_or_stands_begins_no_walk_on_the_spot() {
         assert!(begun(standing(0.0, 0.9, 1.2), None).is_none(), "a walk over ground");
+        assert!(begun(standing(0.0, 0.9, 1.2), Some(true)).is_none(), "over ground, whatever is said");
         assert!(begun(standing(0.0, 0.0, 0.0), Some(true)).is_none(), "somebody stands");
     }
 

@@ -171,7 +171,7 @@ fn deviations_are_those_of_the_projection() {
         places.iter().zip(&pixels).map(|(p, q)| found.camera.project(*p).unwrap().distance_squared(*q)).sum();
     assert!((found.rms_px - (sum_sq / 14.0).sqrt()).abs() < 1e-9);
     assert_eq!(found.degrees_of_freedom, 21);
-    assert!((found.noise_px - (sum_sq / 21.0).sqrt()).abs() < 1e-9);
+    assert!((found.noise_px - ((sum_sq + 1.0) / 22.0).sqrt()).abs() < 1e-9);
     let expected = deviations(&found.camera, &places, found.noise_px);
     for (estimate, sd) in found.estimates.iter().zip(expected) {
         assert!((estimate.sd / sd - 1.0).abs() < 1e-3, "{estimate:?} {sd}");
