@@ -8,7 +8,7 @@
 //!    contours are not less similar on it, and of somebody whose walk would be over if contours and rectangles together are likelier.
 //!
 //! While somebody is followed, the latest frames show the turn from one side only. So when the walk is over, the whole
-//! route of a person who turned is smoothed again.
+//! route of a person who turned is smoothed again, or given up for a straight path if all rectangles together do not turn.
 
 use super::active::Active;
 use super::decisions::{CLEAR_TURN, EARLY_TURN_GAIN, QUICK_TURN_GAIN, SLIGHT_TURN_RAD, TURN_GAIN};
