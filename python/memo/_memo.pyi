@@ -485,6 +485,8 @@ class WalkFit:
     crown_off: Final[float | None]
     """How far the moving region reaches above the model's head, in the median of the frames, as a share of
     the person's height in the image; None if no frame shows the person alone."""
+    is_far: Final[bool]
+    """Whether the edges are too far from the outline for a good fit, as a share of the person's height."""
     is_beside_the_crown: Final[bool]
     """Whether the head of the model is not where the person's is."""
     is_off_ground: Final[bool]

@@ -262,7 +262,7 @@ class _Folder:
             raise VideoError(f"{path}: a folder of images has no time stamps; give its frame rate")
         names.sort(key=_natural_order)
         places = _places(names)
-        self._images = iter(zip(places, names, strict=True))
+        self._images: Iterator[tuple[int, Path]] = iter(zip(places, names, strict=True))
         self.place: int | None = None
         """Which frame of the recording the latest image is, by its number."""
         self.absent = places[-1] + 1 - len(names)
