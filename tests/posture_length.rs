@@ -87,7 +87,7 @@ impl Table {
         println!("{title}: mean  {}", mean.concat());
     }
 
-    /// Root mean square over limbs and trunk: what the posture hangs on most.
+    /// Root mean square over limbs and trunk: what the posture depends on most.
     fn limbs(errors: &[Vec<f64>; 10]) -> f64 {
         rms(&[1, 3, 5, 6].map(|k| errors[k].clone()).concat())
     }

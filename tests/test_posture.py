@@ -572,7 +572,9 @@ def test_nothing_is_decided_about_limbs_that_are_not_seen(scene, tmp_path, memo_
     path.write_text("\n".join(",".join(row) for row in rows))
     code, said, complaint = memo_posture(path, *options)
     assert (code, complaint) == (3, "")
-    assert "of which 0 have possible postures: in the first, nothing that hangs on the neck is seen" in said
+    assert (
+        "of which 0 have possible postures: in the first, no joint connected to the neck is visible" in said
+    )
 
 
 def test_points_beyond_the_picture_are_noticed(found, scene, tmp_path):

@@ -156,6 +156,6 @@ _SENTENCES: dict[str, Callable[[LeftOut], str]] = {
     ),
     "beside somebody": lambda left: "it was not told apart from somebody who was followed there.",
     "too many": lambda left: "eight larger regions moved at the same time; no more are looked at.",
-    "frames too far apart": lambda left: _apart(left),
+    "frames too far apart": _apart,
     "over ground": lambda left: f"somebody {_moved(left)}",
 }

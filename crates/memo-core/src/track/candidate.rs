@@ -142,9 +142,7 @@ impl Candidate {
 
     /// Mean time from one of its frames to the next, seconds.
     fn apart_s(&self) -> f64 {
-        let ends = self.seen.first().zip(self.seen.last());
-        let lasts_s = ends.map_or(0.0, |(first, last)| last.edges.time_s - first.edges.time_s);
-        lasts_s / (self.seen.len().max(2) - 1) as f64
+        lasts_s(&self.seen) / (self.seen.len().max(2) - 1) as f64
     }
 
     /// Starts a walk, or says why not: things that do not move like a walker.
@@ -285,9 +283,13 @@ enum Way {
 
 /// True if frames are so many or last so long that an oblique path can be looked for.
 fn shows_path(seen: &[Seen], options: &TrackerOptions) -> bool {
-    let time_s = |seen: &Seen| seen.edges.time_s;
-    let lasts_s = seen.first().zip(seen.last()).map_or(0.0, |(first, last)| time_s(last) - time_s(first));
-    seen.len() >= options.path_frames || lasts_s >= options.path_s()
+    seen.len() >= options.path_frames || lasts_s(seen) >= options.path_s()
+}
+
+/// Time from the first frame to the last, seconds.
+fn lasts_s(seen: &[Seen]) -> f64 {
+    let ends = seen.first().zip(seen.last());
+    ends.map_or(0.0, |(first, last)| last.edges.time_s - first.edges.time_s)
 }
 
 /// The course of a candidate as somebody of one gait.

@@ -203,7 +203,8 @@ pub(in crate::track) const MOST_SOLE_M: f64 = 0.05;
 pub(in crate::track) const MOST_SD_RAD: [f64; 5] = [0.10, 0.12, 0.14, 0.16, 0.17];
 /// Nor were shoulder and elbow where the upper arm, or elbow where the forearm, misses more of its outline: the model's arm is
 /// not on the person's, as of somebody who holds a telephone (0.38, elbow 140 degrees off) or a box (0.06 to 0.12, 50 to 68
-/// degrees). In 25 drawn walks with swinging arms, upper arms miss up to 0.11 and forearms up to 0.08.
+/// degrees). In 25 drawn walks with swinging arms, upper arms miss up to 0.11 and forearms up to 0.08; of
+/// three more, a slow person's right arm, which swings too, is lost to this. The margin is thin.
 pub(in crate::track) const MOST_MISSED_OF_ARM: f64 = 0.12;
 
 // How sure it is: sides.

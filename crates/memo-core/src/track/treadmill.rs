@@ -86,7 +86,7 @@ const MIDDLE_OF_STANCE: [f64; 2] = [0.1, 0.4];
 /// Standard deviation over people of the speed at the same cadence, as a share of it.
 const AVERAGE_GAIT_SHARE: f64 = 0.15;
 
-/// Who moves farther in the frames of a start is not on a treadmill, whatever is said, metres.
+/// Who moves farther in the frames of a start is not on a treadmill, also where one was asked for, metres. Chosen, not varied.
 const LONGEST_DRIFT_M: f64 = 1.0;
 
 /// What a start on the spot needs besides the frames.
@@ -315,7 +315,10 @@ mod tests {
     #[test]
     fn what_moves_on_or_stands_begins_no_walk_on_the_spot() {
         assert!(begun(standing(0.0, 0.9, 1.2), None).is_none(), "a walk over ground");
-        assert!(begun(standing(0.0, 0.9, 1.2), Some(true)).is_none(), "over ground, whatever is said");
+        assert!(
+            begun(standing(0.0, 0.9, 1.2), Some(true)).is_none(),
+            "over ground, although a treadmill was asked for"
+        );
         assert!(begun(standing(0.0, 0.0, 0.0), Some(true)).is_none(), "somebody stands");
     }
 

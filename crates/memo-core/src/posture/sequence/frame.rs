@@ -30,7 +30,7 @@ pub enum FrameProblem {
         sd_m: f64,
     },
     /// No joint adjacent to the neck is seen, so there is no figure.
-    #[error("nothing that hangs on the neck is seen")]
+    #[error("no joint connected to the neck is visible")]
     NeckAlone,
     /// The tree cannot be grown from the view.
     #[error(transparent)]
