@@ -104,6 +104,17 @@ def test_people_have_numbers_over_their_heads_in_colours_unlike_the_sides(core):
     assert (one[125:145, 190:210] == 100).all()
 
 
+def test_numbers_over_heads_are_those_of_the_legend_and_of_the_files(core, monkeypatch):
+    track = core.Track([0.0, 0.0], core.Camera((640, 480)), "tracked")
+    track.columns |= {"frame": np.array([0, 0]), "person": np.array([0, 1]), "walk": np.array([0, 1])}
+    track.contours = lambda row: [np.array([[200.0 + 300 * row, 150.0], [200.0 + 300 * row, 400.0]])]
+    written = []
+    monkeypatch.setattr("memo.overlay.draw_text", lambda rgb, text, *place, **given: written.append(text))
+    draw_rows(np.full((480, 640), 100, np.uint8), track, [0, 1])
+    assert written[:2] == ["0", "1"]
+    assert [text.split(":")[0] for text in written[3:5]] == ["person 0", "person 1"]
+
+
 @pytest.fixture
 def track(core):
     tracker = core.Tracker(camera=core.Camera((161, 121)))

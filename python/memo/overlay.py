@@ -126,7 +126,7 @@ def _number(rgb: Rgb, person: int, points_px: Segments) -> None:
     u_px, v_px = points_px[np.argmin(points_px[:, 1])]
     height_px = _text_height_px(rgb)
     at = (round(u_px - 0.3 * height_px), round(v_px - 2 * height_px))
-    draw_text(rgb, str(person + 1), PEOPLE[person % len(PEOPLE)], at=at)
+    draw_text(rgb, str(person), PEOPLE[person % len(PEOPLE)], at=at)
 
 
 def _legend(rgb: Rgb, columns: Mapping[str, Any], rows: Sequence[int], several: bool) -> None:
