@@ -13,6 +13,7 @@ from memo.plausible import (
     assumed_height_sentences,
     beside_sentences,
     contradiction_sentences,
+    given_height_sentences,
     has_usual_steps,
     implausible_sentences,
     measured_height_sentences,
@@ -54,6 +55,31 @@ def test_the_height_is_measured_in_a_calibrated_camera(scene):
     assert abs(error_m) < min(0.06, 1.96 * summary["height_sd_m"]), summary
     assert any("tall, measured in the picture" in said for said in track.sentences)
     assert summary["doubts"] == []
+
+
+@pytest.mark.parametrize(
+    ("given_m", "taken", "said"),
+    [
+        ((1.80, 1.65), [(0, 1.80, "given"), (1, 1.65, "given"), (0, 1.80, "given")], ""),
+        (
+            (1.80, 1.65),
+            [(0, 1.65, "given"), (1, 1.80, "given")],
+            "person 0 is 1.65 m tall and person 1 is 1.80 m tall.",
+        ),
+        ((1.80, 1.65, 1.70), [(0, 1.80, "given")], "nobody was taken to be so tall: 1.65 m and 1.70 m."),
+        ((1.80, 1.80), [(0, 1.80, "given"), (1, 1.80, "given"), (2, 1.74, "measured")], ""),
+    ],
+)
+def test_heights_in_another_order_and_heights_of_nobody_are_named(given_m, taken, said):
+    people = [(person, walk(height=_memo.BodyHeight(m, 0.02, source))) for person, m, source in taken]
+    assert " ".join(given_height_sentences(given_m, people)).endswith(said)
+    assert bool(said) == bool(given_height_sentences(given_m, people))
+
+
+def test_a_height_of_nobody_is_named_by_the_track_of_everybody_alone(scene):
+    track = tracked(scene, height_m=[scene.height_m, 1.5])
+    assert track.sentences[0] == "Given, but not used, as nobody was taken to be so tall: 1.50 m."
+    assert not any("nobody" in sentence for sentence in track.of_person(0).sentences)
 
 
 def test_without_camera_and_height_the_scale_is_the_population_s(scene):

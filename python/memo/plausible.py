@@ -7,7 +7,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from memo.wording import enumerated
+
 if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
     from memo._memo import CameraTilt, Walk
 
 __all__ = [
@@ -15,6 +19,7 @@ __all__ = [
     "assumed_height_sentences",
     "beside_sentences",
     "contradiction_sentences",
+    "given_height_sentences",
     "has_usual_steps",
     "implausible_sentences",
     "measured_height_sentences",
@@ -52,6 +57,29 @@ def assumed_height_sentences(
         f"distances and speeds may be too large or too small by {2 * sd_m / height_m:.0%} (two standard "
         "deviations)."
     ]
+
+
+def given_height_sentences(given_m: Sequence[float], walks: Iterable[tuple[int, Walk]]) -> list[str]:
+    """Of heights of several people: those in another order than given, and those of nobody.
+
+    `walks`: persons with their walks.
+    """
+    of_person = {person: walk.height for person, walk in walks}
+    taken_m = {person: height.height_m for person, height in of_person.items() if height.source == "given"}
+    said = []
+    if any(list(given_m[person : person + 1]) != [height_m] for person, height_m in taken_m.items()):
+        each = [f"person {person} is {height_m:.2f} m tall" for person, height_m in sorted(taken_m.items())]
+        said.append(
+            "The picture shows that the heights are not given in the order in which people appear: "
+            f"{enumerated(each)}."
+        )
+    left_m = list(given_m)
+    for height_m in taken_m.values():
+        left_m.remove(height_m)
+    if left_m:
+        heights = enumerated([f"{height_m:.2f} m" for height_m in left_m])
+        said.append(f"Given, but not used, as nobody was taken to be so tall: {heights}.")
+    return said
 
 
 def tilt_sentences(tilt: CameraTilt | None) -> list[str]:

@@ -24,6 +24,7 @@ from memo.plausible import (
     assumed_height_sentences,
     beside_sentences,
     contradiction_sentences,
+    given_height_sentences,
     has_usual_steps,
     implausible_sentences,
     measured_height_sentences,
@@ -317,6 +318,7 @@ class Track:
         """Pixels of the video per pixel of a given frame, per axis: 1 unless set by `of_video`."""
         self._camera = camera
         self._options: Mapping[str, Any] = _memo.defaults("track") if options is None else options
+        self._is_everybody = True
         self._video_size = video_size
         self.camera_motion: CameraMotion = camera_motion or CameraMotion()
         """The camera in every frame; the world of the results is that of the first one."""
@@ -383,6 +385,7 @@ class Track:
             raise ValueError(f"there is no person {person}: the track has {there}, counted from 0")
         alone = copy.copy(self)
         alone.walks = walks
+        alone._is_everybody = False
         return alone
 
     @property
@@ -414,7 +417,7 @@ class Track:
     @property
     def sentences(self) -> list[str]:
         """The findings in sentences, one walk after another."""
-        said = self.camera_motion.sentences + self._flicker_sentences()
+        said = self.camera_motion.sentences + self._flicker_sentences() + self._height_sentences()
         left_out = left_out_sentences(self.left_out, self.seek_report.left_out)
         if not self.walks:
             return [self.summary["message"], *said, *left_out]
@@ -446,6 +449,12 @@ class Track:
                 whose = f"Person {self.people[index]}: "
             said += [whose + sentence for sentence in told]
         return said + left_out
+
+    def _height_sentences(self) -> list[str]:
+        given = self._options.get("height_m")
+        if not (self.walks and self._is_everybody and isinstance(given, Sequence) and len(given) > 1):
+            return []
+        return given_height_sentences(given, zip(self.people, self.walks, strict=True))
 
     def _flicker_sentences(self) -> list[str]:
         seek = self.seek_report
