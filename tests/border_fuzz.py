@@ -1001,7 +1001,7 @@ def results():
     made = [
         *(WALK, WALK.start, WALK.start.line, WALK.height, WALK.gait_parameters[0], explanation(scene)),
         _memo.WalkerState(0, 3, 0.1, 0.2, 0.0, 1.0, 0.0, 0.25, 0.1, 1.3),
-        *(_memo.SeekReport(9, 3, 1, 0, 1, 2, 0.3), motion, _memo.LostView(4, "cut")),
+        *(_memo.SeekReport(9, 3, 1, 0, 13, 1, 2, 0.3), motion, _memo.LostView(4, "cut")),
         _memo.SteadiedFrame(motion, np.zeros((3, 4), np.uint8), np.zeros((3, 4), bool)),
         _memo.LeftOut(3, 20, 0.12, 0.8, 15, "too slow", 0.1, [[3, 10, 20, 30, 80], [20, 11, 20, 30, 80]]),
         _memo.GaitEvent(0.1, 2.5, "toe_off", "left"),

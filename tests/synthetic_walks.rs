@@ -152,6 +152,27 @@ fn a_path_20_degrees_off_the_image_plane_is_found() {
     assert!(errors(&scene, walk)[2] < 0.03);
 }
 
+/// At 100 frames per second hardly anything moves from frame to frame, and a dozen frames show a tenth of a step.
+#[test]
+fn a_walk_is_tracked_as_well_at_a_high_frame_rate() {
+    let of_rate = |rate_hz: f64| {
+        let [frames, empty_frames] = [65.0, 4.0].map(|count| (count * rate_hz / 25.0) as usize);
+        let leftward = Some(false);
+        let options =
+            SceneOptions { seed: 4, rate_hz, frames, empty_frames, leftward, ..SceneOptions::default() };
+        let mut scene = SynthScene::new(options).unwrap();
+        scene.path.heading_rad = -20f64.to_radians();
+        let walks = tracked(&scene);
+        assert_eq!(walks.len(), 1, "{rate_hz}");
+        let shown = (0..scene.len()).filter(|k| scene.truth(*k).is_some()).count();
+        let rows = walks[0].rows().len();
+        assert!(rows as f64 > 0.95 * shown as f64, "{rate_hz}: {rows} of {shown} rows");
+        errors(&scene, &walks[0])
+    };
+    let [usual, fast] = [25.0, 100.0].map(of_rate);
+    assert!((0..3).all(|k| fast[k] < usual[k] + 0.01), "{fast:?} instead of {usual:?}");
+}
+
 #[test]
 fn other_gaits_and_velocity_weights_track_as_well() {
     // Without the fit, which has curves of its own.

@@ -175,7 +175,7 @@ def test_another_video_is_noticed(run, tmp_path, write_video):
     with pytest.raises(ValueError, match=r"short\.mp4: ends before frame 30"):
         list(explain(run, [30], video=short))
     small = write_video("small.mp4", np.zeros((33, 48, 64), np.uint8))
-    with pytest.raises(ValueError, match="outside frames of 64x48 pixels"):
+    with pytest.raises(ValueError, match="expected 640x480, got 64x48"):
         list(explain(run, [30], video=small))
 
 

@@ -76,7 +76,7 @@ def test_without_a_calibrated_camera_nobody_is_followed_by_the_feet(scene):
 
 
 def test_somebody_who_is_not_followed_without_a_camera_is_told_what_to_give():
-    seek = _memo.SeekReport(90, 79, 0, 17, 0, 0, 0.0)
+    seek = _memo.SeekReport(90, 79, 0, 17, 13, 0, 0, 0.0)
     without, calibrated = Track([], seek), Track([], seek, _memo.Camera.level((640, 480), 50.0, 1.0, 5.0))
     assert without.summary["status"] == calibrated.summary["status"] == "not walking"
     assert "tracked only with a calibrated camera" in without.summary["message"]

@@ -332,7 +332,12 @@ class SeekReport:
     frames_cut_off: Final[int]
     """Of these, frames in which the image border cut the region."""
     refused_starts: Final[int]
-    """Refused starts: the region moved too slowly, did not fit the height, or did not walk."""
+    """Refused starts: the region moved too slowly, did not fit the height, or did not walk.
+
+    Walks that were taken back count too.
+    """
+    start_frames: Final[int]
+    """Frames of a starting phase at the rate of the frames."""
     left_out: Final[int]
     """People and things that moved and were not followed."""
     frames_relit: Final[int]

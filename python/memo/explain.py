@@ -201,6 +201,10 @@ def _explained(
         raise RunError(f"{video}: ends before frame {min(left)}, which was tracked according to {file}")
 
 
+#: Frames wait at most so long for the later ones with which they are compared.
+_MOST_WAITING = 17
+
+
 def _found(
     reader: VideoReader,
     explainer: _memo.Explainer,
@@ -209,17 +213,18 @@ def _found(
     progress: Callable[[int, int], object] | None,
 ) -> Iterator[tuple[_memo.Explanation, npt.NDArray[np.uint8]]]:
     """The evidence in the pictures, averaged as for the tracker, each with its frame of the video."""
-    before = np.empty((0, 0), np.uint8)
+    recent: dict[int, npt.NDArray[np.uint8]] = {}
     for done, frame in enumerate(reader, 1):
         whole = frame.luma if shrink == 1 else np.array(frame.luma)
         found = explainer.update(whole if shrink == 1 else _memo.shrunk(whole, shrink), frame.time_s)
+        recent[done - 1] = whole
+        recent.pop(done - 1 - _MOST_WAITING, None)
         if progress is not None:
             progress(done, total)
-        for each in found:  # from the previous frame
-            yield each, _whole(each.luma, before, shrink)
-        before = whole
+        for each in found:  # from the frames before
+            yield each, _whole(each.luma, recent[each.frame], shrink)
     for each in explainer.finish():
-        yield each, _whole(each.luma, before, shrink)
+        yield each, _whole(each.luma, recent[each.frame], shrink)
 
 
 def _whole(

@@ -57,11 +57,12 @@ class Tracker:
     either, that of the population is assumed, and standard deviations and intervals of all lengths contain
     its spread. Without `camera`, one is assumed from the image size, the horizontal field of view
     `fov_deg` and the height; the default is across the width of the image, or across its height if that is
-    larger. The results lag one frame behind the input.
+    larger. The results lag one frame behind the input, or a thirtieth of a second at a higher frame rate.
 
     `gait`: "dense", "sampled_10" (the paper's ten samples) or "boulic" (amplitude follows speed).
     `adapt=False` does not fit the person: angles are those of the average gait, moved by the tracked phase.
-    `start_frames`: number of frames in the starting phase.
+    `start_frames`: number of frames in the starting phase; at more than 30 frames per second, as many as
+    last as long.
     `treadmill`: whether the person walks on a treadmill; None finds out.
     `compensate_gain`: follow exposure drift between frames.
     `background`: keep a slowly varying background, for people who stop.
@@ -643,7 +644,7 @@ class Track:
     def _nobody_message(self) -> str:
         if known := over_ground(self.left_out) or too_far_apart(self.left_out):
             return known
-        moving, needed = self.seek_report.frames_with_candidate, int(self._options["start_frames"])
+        moving, needed = self.seek_report.frames_with_candidate, self.seek_report.start_frames
         why = self._why_nobody()
         if why == "nobody" and 0 < moving < needed:
             return (

@@ -86,7 +86,7 @@ fn options_of(tracker: &Bound<'_, PyTracker>) -> PyResult<TrackerOptions> {
     tracker.get().read(tracker.py(), |tracker| tracker.options().clone())
 }
 
-/// Explains selected frames of a stream, one frame late.
+/// Explains selected frames of a stream, one frame late, or a thirtieth of a second.
 #[pyclass(name = "Explainer", module = "memo._memo")]
 pub struct PyExplainer {
     options: TrackerOptions,
@@ -111,8 +111,8 @@ impl PyExplainer {
         Ok(Self { options, walks, wanted, stream })
     }
 
-    /// Adds the next frame, (H, W) uint8, and its time in seconds. Returns the explanations of the frame before, one
-    /// of each walk that it is part of, if it was requested.
+    /// Adds the next frame, (H, W) uint8, and its time in seconds. Returns the explanations of the frames whose
+    /// neighbours are there now, one of each walk that they are part of, if they were requested.
     fn update(
         &mut self,
         py: Python<'_>,
@@ -125,18 +125,26 @@ impl PyExplainer {
             return Err(PyValueError::new_err("the frames have ended"));
         };
         let evidence = py.detach(|| stream.push(&frame, time_s)).map_err(value_error)?;
-        evidence.map_or(Ok(Vec::new()), |evidence| self.explained(py, &evidence))
+        self.all_explained(py, &evidence)
     }
 
-    /// Returns the explanations of the last frame.
+    /// Returns the explanations of the last frames.
     fn finish(&mut self, py: Python<'_>) -> PyResult<Vec<Explanation>> {
         let Some(mut stream) = self.stream.take() else { return Ok(Vec::new()) };
         let evidence = py.detach(|| stream.finish()).map_err(value_error)?;
-        evidence.map_or(Ok(Vec::new()), |evidence| self.explained(py, &evidence))
+        self.all_explained(py, &evidence)
     }
 }
 
 impl PyExplainer {
+    fn all_explained(&self, py: Python<'_>, evidence: &[Evidence]) -> PyResult<Vec<Explanation>> {
+        let mut all = Vec::new();
+        for evidence in evidence {
+            all.extend(self.explained(py, evidence)?);
+        }
+        Ok(all)
+    }
+
     fn explained(&self, py: Python<'_>, evidence: &Evidence) -> PyResult<Vec<Explanation>> {
         if !self.wanted.contains(&evidence.frame) {
             return Ok(Vec::new());

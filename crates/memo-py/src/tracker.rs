@@ -67,8 +67,11 @@ result! {
         frames_with_candidate: usize,
         /// Of these, frames in which the image border cut the region.
         frames_cut_off: usize,
-        /// Refused starts: the region moved too slowly, did not fit the height, or did not walk.
+        /// Refused starts: the region moved too slowly, did not fit the height, or did not walk. Walks that were
+        /// taken back count too.
         refused_starts: usize,
+        /// Frames of a starting phase at the rate of the frames.
+        start_frames: usize,
         /// People and things that moved and were not followed.
         left_out: usize,
         /// Frames whose brightness differed suddenly and was made that of the others.
@@ -262,7 +265,9 @@ impl PyTracker {
         options.treadmill = treadmill;
         options.fit = adapt.then(FitOptions::default);
         if let Some(frames) = start_frames {
-            options.start_frames = usize::try_from(frames).unwrap_or(0);
+            let refused =
+                |_| PyValueError::new_err(format!("start_frames must be between 5 and 100, got {frames}"));
+            options.start_frames = usize::try_from(frames).map_err(refused)?;
         }
         let tracker = Mutex::new(Some(Box::new(Tracker::new(options).map_err(value_error)?)));
         Ok(Self(Arc::new(Shared { tracker, returned: Condvar::new(), calls: AtomicU64::new(0) })))

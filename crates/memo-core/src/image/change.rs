@@ -247,7 +247,8 @@ impl ChangeDetector {
     }
 }
 
-fn unite(mask: &mut Mask, other: &Mask) {
+/// Adds the pixels of another mask of the same size.
+pub(crate) fn unite(mask: &mut Mask, other: &Mask) {
     for (pixel, &other) in mask.pixels_mut().iter_mut().zip(other.pixels()) {
         *pixel |= other;
     }

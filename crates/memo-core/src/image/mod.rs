@@ -20,6 +20,7 @@ mod side_by_side;
 pub(crate) mod silhouette;
 
 pub use background::{Background, BackgroundError, BackgroundOptions};
+pub(crate) use change::unite;
 pub use change::{
     CHANGE_REACH_PX, ChangeDetector, ChangeOptions, fit_norms, noise_sd, pair_changes, pair_threshold,
     threshold_for_noise,

@@ -12,6 +12,7 @@ use super::height::{BodyHeight, HeightSource};
 use super::locate::{Crown, Rows, Sighting};
 use super::options::TrackerOptions;
 use super::people::{Now, Sign};
+use super::rate::mean_interval_s;
 use super::search::Scene;
 use super::standing::Standing;
 use super::start::StartReport;
@@ -50,7 +51,6 @@ pub(super) struct Active {
     pub(super) average: Walker,
     /// The frames so far, to follow them again on another route; without a fit, the latest.
     pub(super) kept: Vec<(Option<Sighting>, FrameEdges)>,
-    pub(super) gait_speed_mps: f64,
     /// Whether path and person were settled.
     pub(super) settled: bool,
     /// What the fit needs of each frame.
@@ -87,7 +87,6 @@ impl Active {
             height,
             depth_sd_m: 0.0,
             average: Walker { style: GaitStyle::default(), ..walk.walker.clone() },
-            gait_speed_mps: walk.beginning.speed_mps,
             start,
             walk,
             kept: Vec::new(),
@@ -243,6 +242,11 @@ impl Active {
             WalkFit { height, ..fit }
         };
         Some(self.tracked(options).fit(views, fit, p_swapped).map(on_scale))
+    }
+
+    /// Mean time from frame to frame, seconds.
+    pub(super) fn every_s(&self) -> f64 {
+        mean_interval_s(self.steps().iter().map(|step| step.time_s))
     }
 
     /// What the frames show in which contours show the walk.

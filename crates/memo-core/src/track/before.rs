@@ -15,6 +15,7 @@ use super::crowd::{Expected, body_box, expected, keep_unowned};
 use super::decisions::{DECIDING_SHARE, LOST_SHARE};
 use super::fit::views::Piece;
 use super::options::TrackerOptions;
+use super::rate::lasting;
 use super::search::{Axis, Grid, Hypothesis, PHASE_STEP, POSITION_STEP_M, Scene, search_peak};
 use super::standing::Standing;
 use super::walk::{Beginning, FrameEdges, State, Step, Walk};
@@ -28,6 +29,8 @@ const DRIFT: f64 = 0.5;
 const STEPS: f64 = 3.0;
 /// So much of the body's height and width must be in the window in which edges were searched.
 const LEAST_IN_WINDOW: f64 = 0.95;
+/// First steps lead no farther back, seconds.
+const LONGEST_LEAD_S: f64 = 2.0;
 /// The frames of the walk may become less similar by this share.
 const MOST_LOST: f64 = 0.01;
 
@@ -79,13 +82,13 @@ impl<'a> Beside<'a> {
         (!steps.is_empty()).then(|| Self { walk, camera, lead: Lead::of(steps, options) })
     }
 
-    /// Where the person is in a frame, or was before the walk started; `None` after it.
+    /// Where the person is in a frame, or was shortly before the walk started; `None` after it.
     fn place(&self, frame: usize, time_s: f64) -> Option<Hypothesis> {
         let steps = self.walk.steps();
         let after = steps.partition_point(|step| step.frame < frame);
         match steps.get(after)? {
             step if step.frame == frame => Some(step.state.hypothesis()),
-            _ if after == 0 => Some(self.lead.at(time_s)),
+            first if after == 0 && first.time_s - time_s <= LONGEST_LEAD_S => Some(self.lead.at(time_s)),
             _ => None,
         }
     }
@@ -124,7 +127,7 @@ impl Active {
         let [mut along_off, mut phase_off] = [0.0; 2];
         let mut added: Vec<&Seen> = Vec::new();
         let mut beginning = None;
-        let mut missed = 0;
+        let (mut missed, most_missed) = (0, lasting(MISSED_FRAMES, self.every_s()));
         for regions in before.chunk_by(|a, b| a.edges.frame == b.edges.frame).rev() {
             let time_s = regions[0].edges.time_s;
             let at = lead.at(time_s);
@@ -134,7 +137,7 @@ impl Active {
             let shows = |found: &Found| found.similarity >= least && found.visible >= DECIDING_SHARE;
             let Some((seen, Found { best, .. })) = most.filter(|(_, found)| shows(found)) else {
                 missed += 1;
-                if missed > MISSED_FRAMES {
+                if missed > most_missed {
                     break;
                 }
                 continue;

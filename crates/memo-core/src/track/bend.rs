@@ -15,6 +15,7 @@ use super::decisions::{CLEAR_TURN, EARLY_TURN_GAIN, QUICK_TURN_GAIN, SLIGHT_TURN
 use super::frontal::Frontal;
 use super::locate::{Rows, Sighting};
 use super::options::TrackerOptions;
+use super::rate::lasting;
 use super::route::Route;
 use super::search::{Axis, Grid, Hypothesis, PHASE_STEP, POSITION_STEP_M, Path, Scene, search_peak};
 use super::swap::log_odds;
@@ -22,7 +23,7 @@ use super::trail::{Anchor, CORNER_JERK_SD, JERK_SD, Trail};
 use super::walk::{FrameEdges, Step, Walk};
 use glam::DVec2;
 
-/// A turn is looked for after this many further frames.
+/// A turn is looked for after this many further frames, here and below at the usual rate.
 const EVERY: usize = 10;
 /// The quick comparison looks at one frame of so many.
 const QUICK_EVERY: usize = 4;
@@ -45,11 +46,12 @@ enum When {
 impl Active {
     /// Looks for a turn in the latest frames from time to time.
     pub(super) fn turn(&mut self, options: &TrackerOptions) {
+        let every = lasting(EVERY, self.every_s());
         if options.fit.is_none() {
-            let longest = options.path_frames.max(options.start_frames) + EVERY;
+            let longest = options.path_frames.max(options.start_frames) + every;
             self.kept.drain(..self.kept.len().saturating_sub(longest));
         }
-        if self.settled && self.steps().len().is_multiple_of(EVERY) {
+        if self.settled && self.steps().len().is_multiple_of(every) {
             let (first, latest) = (self.latest(options), self.kept.len().saturating_sub(options.path_frames));
             let has_turned = self.bend(first, When::Regularly, JERK_SD, options);
             // Contours on a curve through all frames may tell less than those in the latest ones.
@@ -68,12 +70,12 @@ impl Active {
 
     /// Looks for a turn when the walk seems to be over, also around a corner; true if it goes on around one.
     pub(super) fn goes_on(&mut self, options: &TrackerOptions) -> bool {
-        let before = (self.walk.clone(), self.frontal.clone());
+        let before = (self.walk.clone(), self.frontal.clone(), self.rows);
         for jerk_sd in [JERK_SD, CORNER_JERK_SD] {
             if self.bend(self.latest(options), When::Over, jerk_sd, options) && !self.is_over() {
                 return true;
             }
-            (self.walk, self.frontal) = before.clone();
+            (self.walk, self.frontal, self.rows) = before.clone();
         }
         false
     }
@@ -155,24 +157,31 @@ impl Active {
         }
         // 1. The curve, joined to the route so far, by the rows with which the contours are more similar.
         let before = self.frames_before(first_s);
-        let anchored = &self.steps()[before.saturating_sub(ANCHORS)..];
+        let most = lasting(ANCHORS, self.every_s());
+        let anchored = &self.steps()[before.saturating_sub(most)..];
         let Some(along_m) = anchored.first().map(|step| step.state.along.position) else { return false };
         let route = &self.walk.route;
-        let anchors: Vec<Anchor> = anchored[..before.min(ANCHORS)]
+        let anchors: Vec<Anchor> = anchored[..before.min(most)]
             .iter()
             .map(|step| Anchor { time_s: step.time_s, place_m: route.place(step.state.along.position) })
             .collect();
-        let frames = || self.steps()[before..].iter().zip(&kept).step_by(QUICK_EVERY);
+        let quick_every = lasting(QUICK_EVERY, self.every_s());
+        let frames = || self.steps()[before..].iter().zip(&kept).step_by(quick_every);
         let quick = |new: &Route| -> f64 {
             frames().map(|(step, (_, edges))| self.similarity_on(new, step, edges, options)).sum()
         };
+        // Of a straight route from its beginning on, nothing is left.
+        let onto = |points: &[DVec2]| match before {
+            0 if route.is_straight() => Route::through(points, along_m),
+            _ => route.continued(points, along_m),
+        };
         let by = |rows: &Rows| {
             let trail = Trail::new(*rows, &anchors, &sightings, &self.camera, &self.crown());
-            let curved = route.continued(&trail.curve(jerk_sd), along_m)?;
+            let curved = onto(&trail.curve(jerk_sd))?;
             let similarity = quick(&curved);
             // Other rows also show another distance, which is no turn.
             let is_turn = *rows == self.rows || {
-                let straight = route.continued(&trail.straight(), along_m);
+                let straight = onto(&trail.straight());
                 straight.is_none_or(|straight| similarity > (1.0 + QUICK_TURN_GAIN) * quick(&straight))
             };
             is_turn.then_some((*rows, trail, curved, similarity))

@@ -13,6 +13,7 @@ use super::locate::{
 };
 use super::options::TrackerOptions;
 use super::options::start_height;
+use super::rate::lasting;
 use super::start::{StartReport, StartSearch};
 use super::walk::{FrameEdges, Walk};
 use crate::calibrate::TiltEstimate;
@@ -174,7 +175,6 @@ impl Candidate {
         Ok(Active {
             tilt: given.tilt,
             depth_sd_m: course.depth_sd_m,
-            gait_speed_mps: course.speed_mps,
             kept: self.seen.iter().map(|seen| (Some(seen.sighting), seen.edges.clone())).collect(),
             pieces: self.seen.iter().filter_map(|seen| seen.piece.clone()).collect(),
             ..Active::new(walk, start, camera, height)
@@ -245,10 +245,11 @@ impl Candidate {
 
         let edges: Vec<&FrameEdges> = self.seen.iter().map(|seen| &seen.edges).collect();
         let mut of_average = average.search(&edges, options);
-        let first = of_average.glance(GLANCE_EVERY).ok_or(Reason::NotWalking)?;
+        let every = lasting(GLANCE_EVERY, self.apart_s());
+        let first = of_average.glance(every).ok_or(Reason::NotWalking)?;
         let promising = |entered: Entered| {
             let mut search = entered.search(&edges, options).after(&of_average);
-            let glance = search.glance(GLANCE_EVERY)?;
+            let glance = search.glance(every)?;
             let is_similar = glance.similarity >= GLANCE_SHARE * first.similarity;
             (is_similar && glance.contrast >= GLANCE_CONTRAST)
                 .then(|| search.finish())?
@@ -521,7 +522,7 @@ pub(super) mod tests {
         let sightings: Vec<Sighting> = seen.iter().map(|seen| seen.sighting).collect();
         let crown = Crown { height_m: walker().level_crown_height_m(), sd_m: 0.02 };
         let course = locate(&sightings, &camera(), &crown).unwrap();
-        assert_eq!((active.depth_sd_m, active.gait_speed_mps), (course.depth_sd_m, course.speed_mps));
+        assert_eq!(active.depth_sd_m, course.depth_sd_m);
     }
 
     #[test]

@@ -102,6 +102,7 @@ impl TrackedWalk {
         }
         let times_s = steps[kept.start].time_s..=steps[kept.end - 1].time_s;
         self.walk.keep(kept.clone());
+        self.is_frontal |= self.steps().iter().all(|step| step.by_feet);
         if !self.camera_turns.is_empty() {
             self.camera_turns = self.camera_turns[kept.clone()].to_vec();
         }

@@ -12,11 +12,12 @@ use super::decisions::{
 };
 use super::frontal::Frontal;
 use super::people::Sign;
+use super::rate::latest;
 use super::walk::{Step, Twin};
 
 /// Somebody who moves faster over the last frames has left the treadmill, m/s.
 const LEAVING_MPS: f64 = 0.7;
-/// Number of last frames that decide whether a walk continues.
+/// Number of last frames that decide whether a walk continues, at the usual rate.
 const RECENT_FRAMES: usize = 12;
 
 /// Of a walk, at most this share of the frames may show no change where the model walks. Of 43 drawn people (29 walks, ten
@@ -30,8 +31,8 @@ impl Active {
     /// much slower than before. Who is lost or hidden seems to go on.
     pub(super) fn standing(&self) -> Option<Sign> {
         let twin = self.walk.best_twin();
-        let recent = &twin.steps[twin.steps.len().checked_sub(RECENT_FRAMES)?..];
-        let (first, last) = (&twin.steps[0], &recent[RECENT_FRAMES - 1]);
+        let recent = latest(&twin.steps, RECENT_FRAMES)?;
+        let (first, last) = (&twin.steps[0], &recent[recent.len() - 1]);
         let covered_m = last.state.along.position - first.state.along.position;
         let mean_mps = covered_m.abs() / (last.time_s - first.time_s);
         // Who turns round on the spot is slow for a moment only.
@@ -46,22 +47,23 @@ impl Active {
     /// True if in the last frames the person stood still or the model matched little.
     pub(super) fn is_over(&self) -> bool {
         let twin = self.walk.best_twin();
-        let count = twin.steps.len();
-        if count < 2 * RECENT_FRAMES {
+        let (Some(longer), Some(recent)) =
+            (latest(&twin.steps, 2 * RECENT_FRAMES), latest(&twin.steps, RECENT_FRAMES))
+        else {
             return false;
-        }
-        let recent = &twin.steps[count - RECENT_FRAMES..];
-        let (first, last) = (&recent[0], &recent[RECENT_FRAMES - 1]);
+        };
+        let (first, last) = (&recent[0], &recent[recent.len() - 1]);
         let covered_m = (last.state.along.position - first.state.along.position).abs();
         let elapsed_s = last.time_s - first.time_s;
         let is_slow = covered_m < SLOWEST_MPS * elapsed_s;
         let left = if self.is_on_treadmill { covered_m > LEAVING_MPS * elapsed_s } else { is_slow };
         // The phase of somebody who walks on may stand for a moment: by half as many frames, five of 42 drawn people who walked alone
         // were lost after 0.4 to 0.8 of their walks. On a treadmill, nothing else shows a stop.
-        let of_phase = if self.is_on_treadmill { first } else { &twin.steps[count - 2 * RECENT_FRAMES] };
+        let of_phase = if self.is_on_treadmill { first } else { &longer[0] };
         let cycles = (last.state.phase.position - of_phase.state.phase.position).abs();
         let stopped = left || cycles < SLOWEST_HZ * (last.time_s - of_phase.time_s);
-        let unseen = |frontal: &Frontal| count - frontal.seen().min(count) >= RECENT_FRAMES;
+        let count = twin.steps.len();
+        let unseen = |frontal: &Frontal| count - frontal.seen().min(count) >= recent.len();
         let is_unseen = last.by_feet && self.frontal.as_ref().is_some_and(unseen);
         stopped
             || is_unseen
@@ -118,7 +120,8 @@ impl Active {
         let is_gone = |s: &&Step| f64::from(s.similarity) < low || s.visible < DECIDING_SHARE || is_empty(s);
         let gone =
             Some(twin.steps.iter().rev().take_while(is_gone).count()).filter(|gone| *gone >= LEAST_GONE);
-        let over = if self.is_over() { RECENT_FRAMES / 2 } else { 0 };
+        let recent = latest(&twin.steps, RECENT_FRAMES).filter(|_| self.is_over());
+        let over = recent.map_or(0, |recent| recent.len() / 2);
         let end = twin.steps.len() - over.max(gone.unwrap_or(0));
         let frontal = self.frontal.as_ref().filter(|_| twin.steps.last().is_some_and(|step| step.by_feet));
         let end = frontal.map_or(end, |frontal| frontal.seen().min(end));
@@ -288,6 +291,20 @@ mod tests {
         assert!(ending(40, 1.2, 0.9, border - 0.005).is_over());
         assert!(!ending(40, 1.2, 0.9, border + 0.005).is_over());
         assert!(ending(40, 1.2, 0.9, 0.0).is_over());
+    }
+
+    /// At 100 frames per second a dozen of them, in which the model finds nothing, are a tenth of a second.
+    #[test]
+    fn a_walk_ends_after_the_same_time_at_a_high_frame_rate() {
+        let fast = |lost: usize| {
+            let mut walk = ending_in(lost, 160, [1.2, 0.9], 0.0);
+            for step in &mut walk.walk.twins[0].steps {
+                step.time_s *= 0.25;
+            }
+            // As far and as many cycles in a quarter of the time.
+            walk.is_over()
+        };
+        assert!(!fast(12) && fast(40));
     }
 
     #[test]

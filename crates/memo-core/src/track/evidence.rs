@@ -1,9 +1,10 @@
 //! Evidence of each frame for tracking: moving regions and straight edges (Rohr 1994, sections 4.1 and 4.3).
 //!
-//! Change detection compares a frame with the one before and the one after, so evidence comes one frame late. Two
-//! frames are kept, whatever the length of the stream. With a [`Steadier`], frames of a moving camera are first turned
-//! into the camera of the first frame; what a frame does not show there is no evidence. If the light flickers, frames have
-//! the brightness before ([`SteadyLight`]).
+//! Change detection compares a frame with the one before and the one after, so evidence comes one frame late. At more than 30
+//! frames per second, in which hardly anything moves from one to the next, these are the nearest ones that are about a
+//! thirtieth of a second away, and the frames of that time are kept. With a [`Steadier`], frames of a moving camera are first
+//! turned into the camera of the first frame; what a frame does not show there is no evidence. If the light flickers, frames
+//! have the brightness before ([`SteadyLight`]).
 
 use super::score::EdgeLine;
 use super::steady::{CameraMotion, Loss, Steadied, Steadier};
@@ -14,12 +15,13 @@ use crate::image::edge::{EdgeChains, EdgeDomain, EdgeOptions, Window, edge_chain
 use crate::image::flow::{FlowField, FlowOptions, velocity_field};
 use crate::image::line::{EdgeSegment, LineError, LineOptions, segments_from_chains};
 use crate::image::{
-    Background, BackgroundOptions, ChangeDetector, ChangeOptions, CleanOptions, Frame, FrameError,
-    GroupOptions, Image, LightReport, Mask, Rectangle, Region, SteadyLight, clean, dilate, fill_holes,
-    group_regions, group_regions_of, regions,
+    Background, BackgroundOptions, ChangeOptions, CleanOptions, Frame, FrameError, GroupOptions, Image,
+    LightReport, Mask, Rectangle, Region, SteadyLight, clean, dilate, fill_holes, group_regions,
+    group_regions_of, pair_changes, regions, unite,
 };
 use crate::model::Camera;
 use glam::DVec2;
+use std::collections::VecDeque;
 use thiserror::Error;
 
 /// Why a frame was refused.
@@ -131,7 +133,8 @@ pub struct Evidence {
     pub mask: Mask,
     /// The same with the higher threshold for the rectangle.
     pub firm_mask: Mask,
-    /// Velocities of the changed pixels towards the next frame; `None` if not requested or not determined.
+    /// Velocities of the changed pixels towards the later frame with which this one is compared; `None` if not requested or not
+    /// determined.
     pub velocity: Option<FlowField>,
     /// Of a steadied frame, the pixels that it or its neighbours do not show, with those near them.
     pub unseen: Option<Mask>,
@@ -222,18 +225,35 @@ impl Evidence {
     }
 }
 
-/// Evidence of a stream of frames, one frame late.
+/// Frames at least so long before and after a frame are compared with it, seconds: at up to 33 frames per second, its neighbours.
+const COMPARED_S: f64 = 0.03;
+/// Frames compared at most, whatever their rate.
+const MOST_WAITING: usize = 16;
+
+/// Evidence of a stream of frames, one frame late, or a thirtieth of a second.
 #[derive(Debug)]
 pub struct EvidenceStream {
     options: EvidenceOptions,
-    detectors: [ChangeDetector; 2],
-    waiting: Option<(usize, f64, Image<u8>)>,
+    /// The frames whose later neighbour has not come, in order.
+    waiting: VecDeque<Waiting>,
+    /// Time of the last frame, seconds.
+    last_s: Option<f64>,
     background: Option<Background>,
     frames: usize,
     steadier: Option<Steadier>,
     light: SteadyLight,
-    /// What the last three frames do not show, the latest last.
-    unseen: [Option<Mask>; 3],
+}
+
+/// A frame that waits for its later neighbour.
+#[derive(Debug)]
+struct Waiting {
+    frame: usize,
+    time_s: f64,
+    grey: Image<u8>,
+    /// The changes since its earlier neighbour, with the low threshold and with the rectangle's; `None` without one.
+    since: Option<[Mask; 2]>,
+    /// What the frame does not show, and what its earlier neighbour does not show.
+    unseen: [Option<Mask>; 2],
 }
 
 impl EvidenceStream {
@@ -241,13 +261,12 @@ impl EvidenceStream {
     pub fn new(options: EvidenceOptions) -> Self {
         Self {
             options,
-            detectors: detectors(&options),
-            waiting: None,
+            waiting: VecDeque::new(),
+            last_s: None,
             background: None,
             frames: 0,
             steadier: None,
             light: SteadyLight::default(),
-            unseen: [const { None }; 3],
         }
     }
 
@@ -298,96 +317,119 @@ impl EvidenceStream {
         self.steadier.as_mut()?.take_loss()
     }
 
-    /// Adds a frame and returns the evidence of the frame before; `None` for the first frame of a view.
-    pub fn push(&mut self, frame: &Frame<'_>, time_s: f64) -> Result<Option<Evidence>, EvidenceError> {
+    /// Adds a frame and returns the evidence of the frames of which it is the later neighbour: none for the first frames of a
+    /// view, then one, or several after a pause of a stream with a high frame rate.
+    pub fn push(&mut self, frame: &Frame<'_>, time_s: f64) -> Result<Vec<Evidence>, EvidenceError> {
         if !time_s.is_finite() {
             return Err(EvidenceError::Time { time_s });
         }
-        if let Some((_, previous_s, _)) = self.waiting
-            && time_s <= previous_s
-        {
+        if let Some(previous_s) = self.last_s.filter(|last_s| time_s <= *last_s) {
             return Err(EvidenceError::TimeOrder { previous_s, time_s });
         }
         let evidence = self.push_next(frame, time_s)?;
         self.frames += 1;
+        self.last_s = Some(time_s);
         Ok(evidence)
     }
 
-    fn push_next(&mut self, frame: &Frame<'_>, time_s: f64) -> Result<Option<Evidence>, EvidenceError> {
-        let number = self.frames;
+    fn push_next(&mut self, frame: &Frame<'_>, time_s: f64) -> Result<Vec<Evidence>, EvidenceError> {
         let lit = self.light.push(frame, self.options.change.min_threshold)?;
         let lit = lit.as_ref().map(|lit| lit.as_frame());
         let frame = lit.as_ref().unwrap_or(frame);
         let Some(steadier) = &mut self.steadier else {
-            return self.push_steady(number, frame, time_s);
+            return self.push_steady(frame, time_s, None);
         };
         let steadied = steadier.push(frame)?;
         if steadier.has_news() {
             self.begin_view();
         }
-        let (picture, unseen) = match steadied {
-            Steadied::AsGiven => (None, None),
-            Steadied::Moved { picture, unseen } => (Some(picture), Some(unseen)),
-            Steadied::Lost => return Ok(None),
-        };
-        self.unseen.rotate_left(1);
-        self.unseen[2] = unseen;
-        match &picture {
-            None => self.push_steady(number, frame, time_s),
-            Some(picture) => self.push_steady(number, &picture.as_frame(), time_s),
+        match steadied {
+            Steadied::AsGiven => self.push_steady(frame, time_s, None),
+            Steadied::Moved { picture, unseen } => {
+                self.push_steady(&picture.as_frame(), time_s, Some(unseen))
+            }
+            Steadied::Lost => Ok(Vec::new()),
         }
     }
 
     /// Forgets the frames of a view that has ended.
     fn begin_view(&mut self) {
-        self.detectors = detectors(&self.options);
         self.light.begin_view();
-        self.waiting = None;
+        self.waiting.clear();
         self.background = None;
-        self.unseen = [const { None }; 3];
     }
 
     fn push_steady(
         &mut self,
-        number: usize,
         frame: &Frame<'_>,
         time_s: f64,
-    ) -> Result<Option<Evidence>, EvidenceError> {
-        let [low, firm] = &mut self.detectors;
-        let masks = low.push(frame)?.zip(firm.push(frame)?);
-        let before = self.waiting.replace((number, time_s, frame.to_image()));
-        self.evidence(before, masks, Some(frame))
-    }
-
-    /// What the waiting frame or a neighbour does not show, with a margin.
-    fn unseen_near(&self) -> Option<Mask> {
-        let mut all: Option<Mask> = None;
-        for mask in self.unseen.iter().flatten() {
-            match &mut all {
-                None => all = Some(mask.clone()),
-                Some(all) => all.pixels_mut().iter_mut().zip(mask.pixels()).for_each(|(a, b)| *a |= b),
-            }
+        unseen: Option<Mask>,
+    ) -> Result<Vec<Evidence>, EvidenceError> {
+        if let Some(waiting) = self.waiting.front() {
+            waiting.grey.as_frame().check_same_size(frame)?;
         }
-        all.map(|all| dilate(&all, UNSEEN_MARGIN_PX))
+        // 1. The frames of which this is the later neighbour. If too many wait, the first of them too.
+        let compared_s = time_s - COMPARED_S;
+        let is_compared = |waiting: &Waiting| waiting.time_s <= compared_s;
+        let count = self.waiting.partition_point(is_compared);
+        let count = count.max((self.waiting.len() + 1).saturating_sub(MOST_WAITING));
+        // 2. Their changes since their earlier neighbours and up to this one.
+        let changes = |waiting: &Waiting| -> Result<[Mask; 2], FrameError> {
+            let [low, firm] = change_options(&self.options);
+            let grey = waiting.grey.as_frame();
+            Ok([pair_changes(&grey, frame, &low)?, pair_changes(&grey, frame, &firm)?])
+        };
+        let until: Vec<[Mask; 2]> = self.waiting.iter().take(count).map(changes).collect::<Result<_, _>>()?;
+        let (mut since, mut unseen_before) = (None, None);
+        let mut found = Vec::with_capacity(count);
+        for until in until {
+            let Some(waiting) = self.waiting.pop_front() else { break };
+            (since, unseen_before) = (Some(until.clone()), waiting.unseen[0].clone());
+            found.push(self.evidence(waiting, Some((until, frame, &unseen)))?);
+        }
+        // 3. This one waits.
+        let (number, grey) = (self.frames, frame.to_image());
+        self.waiting.push_back(Waiting {
+            frame: number,
+            time_s,
+            grey,
+            since,
+            unseen: [unseen, unseen_before],
+        });
+        Ok(found)
     }
 
-    /// The evidence of the last frame; `None` if there were fewer than two frames.
-    pub fn finish(&mut self) -> Result<Option<Evidence>, EvidenceError> {
-        let last = self.waiting.take();
-        let [low, firm] = std::mem::replace(&mut self.detectors, detectors(&self.options));
-        self.evidence(last, low.finish().zip(firm.finish()), None)
+    /// The evidence of the last frames, from their earlier neighbours.
+    pub fn finish(&mut self) -> Result<Vec<Evidence>, EvidenceError> {
+        let last: Vec<Waiting> = self.waiting.drain(..).filter(|waiting| waiting.since.is_some()).collect();
+        last.into_iter().map(|waiting| self.evidence(waiting, None)).collect()
     }
 
+    /// The evidence of a frame, with its changes up to its later neighbour, that neighbour, and what it does not show.
     fn evidence(
         &mut self,
-        frame: Option<(usize, f64, Image<u8>)>,
-        masks: Option<(Mask, Mask)>,
-        next: Option<&Frame<'_>>,
-    ) -> Result<Option<Evidence>, EvidenceError> {
-        let (Some((frame, time_s, grey)), Some((mut low, mut firm))) = (frame, masks) else {
-            return Ok(None);
+        waiting: Waiting,
+        later: Option<([Mask; 2], &Frame<'_>, &Option<Mask>)>,
+    ) -> Result<Evidence, EvidenceError> {
+        let Waiting { frame, time_s, grey, since, unseen } = waiting;
+        let (until, next, unseen_later) = match later {
+            Some((until, next, unseen)) => (Some(until), Some(next), unseen.as_ref()),
+            None => (None, None, None),
         };
-        let unseen = self.unseen_near();
+        let blank = || [0; 2].map(|_| Image::filled(grey.width(), grey.height(), false));
+        let [mut low, mut firm] = match (since, until) {
+            (Some(mut since), Some(until)) => {
+                since.iter_mut().zip(&until).for_each(|(mask, other)| unite(mask, other));
+                since
+            }
+            (since, until) => since.or(until).unwrap_or_else(blank),
+        };
+        // What the frame or a neighbour does not show, with a margin.
+        let not_shown = unseen.iter().flatten().chain(unseen_later).cloned().reduce(|mut all, other| {
+            unite(&mut all, &other);
+            all
+        });
+        let unseen = not_shown.map(|all| dilate(&all, UNSEEN_MARGIN_PX));
         if let Some(unseen) = &unseen {
             clear(&mut low, unseen);
             clear(&mut firm, unseen);
@@ -399,7 +441,7 @@ impl EvidenceStream {
             (Some(options), Some(next)) => velocity_field(&grey.as_frame(), next, &mask, options).ok(),
             _ => None,
         };
-        Ok(Some(Evidence { frame, time_s, grey, mask, firm_mask, velocity, unseen }))
+        Ok(Evidence { frame, time_s, grey, mask, firm_mask, velocity, unseen })
     }
 
     /// Adds pixels that differ from the background to the change masks, then updates the background where the low
@@ -425,10 +467,10 @@ fn clear(mask: &mut Mask, unseen: &Mask) {
     mask.pixels_mut().iter_mut().zip(unseen.pixels()).for_each(|(pixel, unseen)| *pixel &= !unseen);
 }
 
-/// Change detectors with the low threshold and with the rectangle's threshold.
-fn detectors(options: &EvidenceOptions) -> [ChangeDetector; 2] {
+/// Change detection with the low threshold and with the rectangle's.
+fn change_options(options: &EvidenceOptions) -> [ChangeOptions; 2] {
     let min_threshold = options.rectangle_threshold.max(options.change.min_threshold);
-    [options.change, ChangeOptions { min_threshold, ..options.change }].map(ChangeDetector::new)
+    [options.change, ChangeOptions { min_threshold, ..options.change }]
 }
 
 #[cfg(test)]
@@ -457,7 +499,7 @@ mod tests {
     fn evidence_of(options: EvidenceOptions, frames: &[Image<u8>]) -> Vec<Evidence> {
         let mut stream = EvidenceStream::new(options);
         let push = |(k, frame): (usize, &Image<u8>)| stream.push(&frame.as_frame(), 0.04 * k as f64).unwrap();
-        let mut all: Vec<Evidence> = frames.iter().enumerate().filter_map(push).collect();
+        let mut all: Vec<Evidence> = frames.iter().enumerate().flat_map(push).collect();
         all.extend(stream.finish().unwrap());
         all
     }
@@ -483,19 +525,45 @@ mod tests {
         let mut stream = EvidenceStream::new(EvidenceOptions::default());
         for (k, frame) in frames.iter().enumerate() {
             let found = stream.push(&frame.as_frame(), 1.0 + 0.5 * k as f64).unwrap();
-            assert_eq!(found.is_none(), k == 0);
-            let Some(found) = found else { continue };
+            assert_eq!(found.len(), usize::from(k > 0));
+            let Some(found) = found.first() else { continue };
             assert_eq!((found.frame, found.time_s), (k - 1, 0.5 + 0.5 * k as f64));
             assert!(found.grey == frames[k - 1], "its own picture");
             // The mask covers the box, where it goes and, after the first frame, where it was before.
             let marked = |x: usize| found.mask.at(x + 7, 47);
             assert!(marked(10 * k) && marked(10 * (k + 1)) && (k == 1 || marked(10 * (k - 1))));
         }
-        let last = stream.finish().unwrap().expect("the last frame has one neighbour");
+        let last = stream.finish().unwrap().pop().expect("the last frame has one neighbour");
         assert_eq!((last.frame, last.time_s), (3, 2.5));
         assert!(last.mask.at(47, 47) && last.mask.at(37, 47) && !last.mask.at(18, 47));
         let one = evidence_of(EvidenceOptions::default(), &frames[..1]);
         assert!(one.is_empty() && evidence_of(EvidenceOptions::default(), &[]).is_empty());
+    }
+
+    /// At 100 frames per second a box that moves by a pixel is seen to move by three, and every frame has its evidence.
+    #[test]
+    fn at_a_high_rate_frames_are_compared_that_are_a_thirtieth_of_a_second_apart() {
+        let frames: Vec<Image<u8>> = (0..12).map(|k| boxed(40 + k, 180)).collect();
+        let mut stream = EvidenceStream::new(EvidenceOptions::default());
+        let mut all = Vec::new();
+        for (k, frame) in frames.iter().enumerate() {
+            let found = stream.push(&frame.as_frame(), 0.01 * k as f64).unwrap();
+            assert!(found.iter().map(|found| found.frame).eq((k >= 3).then(|| k - 3)), "{k}");
+            all.extend(found);
+        }
+        all.extend(stream.finish().unwrap());
+        assert!(all.iter().map(|found| found.frame).eq(0..12));
+        let slow: Vec<Image<u8>> = frames.iter().step_by(3).cloned().collect();
+        let slow = evidence_of(EvidenceOptions::default(), &slow);
+        assert_eq!((&all[3].mask, &all[6].mask), (&slow[1].mask, &slow[2].mask));
+        // After a pause, the frames before it have their later neighbour at once.
+        let mut stream = EvidenceStream::new(EvidenceOptions::default());
+        let found =
+            [0.0, 0.01, 0.02, 0.5].map(|time_s| stream.push(&frames[0].as_frame(), time_s).unwrap().len());
+        assert_eq!(found, [0, 0, 0, 3]);
+        // However high the rate is, few frames wait.
+        let push = |k: usize| stream.push(&frames[0].as_frame(), 1.0 + 1e-4 * k as f64).unwrap().len();
+        assert_eq!((0..100).map(push).sum::<usize>(), 1 + 100 - MOST_WAITING);
     }
 
     #[test]
@@ -513,8 +581,8 @@ mod tests {
         }
         let small = Image::filled(32, 32, 100u8);
         assert!(matches!(stream.push(&small.as_frame(), 0.6), Err(EvidenceError::Frame(_))));
-        assert_eq!(stream.push(&second.as_frame(), 0.7).unwrap().unwrap().frame, 0);
-        let last = stream.finish().unwrap().unwrap();
+        assert_eq!(stream.push(&second.as_frame(), 0.7).unwrap()[0].frame, 0);
+        let last = stream.finish().unwrap().pop().unwrap();
         assert_eq!((last.frame, last.time_s), (1, 0.7));
     }
 

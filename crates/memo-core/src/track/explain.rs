@@ -117,9 +117,9 @@ mod tests {
             }
         };
         for k in 0..scene.len() {
-            stream.push(&scene.frame(k).as_frame(), scene.time_s(k)).unwrap().map(&mut add);
+            stream.push(&scene.frame(k).as_frame(), scene.time_s(k)).unwrap().into_iter().for_each(&mut add);
         }
-        stream.finish().unwrap().map(&mut add);
+        stream.finish().unwrap().into_iter().for_each(&mut add);
         all
     }
 

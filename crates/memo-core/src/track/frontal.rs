@@ -22,6 +22,7 @@ mod rhythm;
 
 use super::decisions::{ALONG_THE_SIGHT_RAD, COMMON_ROW_SD_PX, FASTEST_MPS, FRONTAL_GAIN, SLOWEST_MPS};
 use super::locate::Sighting;
+use super::rate::{lasting, mean_interval_s, more};
 use super::route::Route;
 use super::search::Hypothesis;
 use super::standing::Standing;
@@ -41,7 +42,7 @@ const STEPS: usize = 6;
 /// Standard deviation of the reach of people's feet about the model's, metres, and of the lowest row, pixels.
 const REACH_SD_M: f64 = 0.08;
 const ROW_SD_PX: f64 = 1.5;
-/// Residuals of so many neighbouring frames are alike.
+/// Residuals of so many neighbouring frames are alike, at the usual rate.
 const LIKE_FRAMES: f64 = 4.0;
 /// Beyond this many standard deviations, residuals count ever less (Cauchy weights).
 const CAUCHY_SD: f64 = 1.5;
@@ -50,7 +51,7 @@ const CONTOURS_SD_M: f64 = 0.05;
 const CONTOURS_PHASE_SD: f64 = 0.03;
 /// On a curve, the feet show place and phase within this angle of the line of sight, and contours beyond it.
 const BY_FEET_RAD: f64 = 0.5;
-/// Frames that show the speed and cadence with which places and phases go on.
+/// Frames that show the speed and cadence with which places and phases go on, at the usual rate.
 const LEADING: usize = 12;
 /// Changes in a second, as standard deviations: of the speed, m/s, and of the cadence, cycles/s.
 const SPEED_CHANGE_SD: f64 = 0.1;
@@ -158,7 +159,7 @@ impl Frontal {
         // 2. The best line of phase against even motion.
         let points: Vec<(f64, f64)> = seen.iter().map(|(t, place)| (*t, path.along(*place))).collect();
         let line = Line::nearest(&mut frontal.reach, &points, rates)?;
-        let gain = (line.likelihood - evenly(&points)) / LIKE_FRAMES;
+        let gain = (line.likelihood - evenly(&points)) / alike(&points);
         Some((gain, frontal, line))
     }
 
@@ -217,10 +218,15 @@ impl Frontal {
         REACH_SD_M.hypot(COMMON_ROW_SD_PX * mean_m)
     }
 
+    /// Mean time from frame to frame, seconds.
+    fn every_s(&self) -> f64 {
+        mean_interval_s(self.paces.iter().map(|pace| pace.time_s))
+    }
+
     /// A further frame, at first where speed and cadence lead.
     pub(super) fn push(&mut self, time_s: f64, seen: &Lowest) {
         let last = self.paces[self.paces.len() - 1];
-        let before = self.paces[self.paces.len().saturating_sub(1 + LEADING)];
+        let before = self.paces[self.paces.len().saturating_sub(1 + lasting(LEADING, self.every_s()))];
         let share = (time_s - last.time_s) / (last.time_s - before.time_s);
         let along_m = last.along_m + share * (last.along_m - before.along_m);
         let phase = last.phase + share * (last.phase - before.phase);
@@ -230,7 +236,8 @@ impl Frontal {
 
     /// A frame before the first, near a place, where the phase of the next frames leads.
     pub(super) fn precede(&mut self, time_s: f64, seen: &Lowest, place: DVec2) {
-        let (first, later) = (self.paces[0], self.paces[LEADING.min(self.paces.len() - 1)]);
+        let leading = lasting(LEADING, self.every_s()).min(self.paces.len() - 1);
+        let (first, later) = (self.paces[0], self.paces[leading]);
         let rate_hz = (later.phase - first.phase) / (later.time_s - first.time_s);
         let along_m = self.route.along(place, first.along_m);
         let phase = first.phase - rate_hz * (first.time_s - time_s);
@@ -258,7 +265,7 @@ impl Frontal {
         if points.len() < LEADING {
             return None;
         }
-        Some((likelihood - evenly(&points)) / LIKE_FRAMES)
+        Some((likelihood - evenly(&points)) / alike(&points))
     }
 
     /// Whether feet and not contours show the place and phase of a frame.
@@ -328,6 +335,7 @@ impl Frontal {
     /// Returns the variances of place and phase: of all frames, or of the last one if earlier ones are held.
     pub(super) fn solve(&mut self, from: usize) -> Option<Vec<[f64; 2]>> {
         let mut variances = None;
+        let alike = LIKE_FRAMES * more(self.every_s());
         for step in 0..STEPS {
             let count = self.paces.len() - from;
             let mut arrow = Arrow::new(count, 2, 0);
@@ -340,8 +348,8 @@ impl Frontal {
                 }
                 if !self.is_along(along_m) {
                     let Some([seen_m, seen]) = contours else { continue };
-                    arrow.add_row(&[(x, 1.0)], seen_m, 1.0 / (LIKE_FRAMES * CONTOURS_SD_M.powi(2)));
-                    arrow.add_row(&[(p, 1.0)], seen, 1.0 / (LIKE_FRAMES * CONTOURS_PHASE_SD.powi(2)));
+                    arrow.add_row(&[(x, 1.0)], seen_m, 1.0 / (alike * CONTOURS_SD_M.powi(2)));
+                    arrow.add_row(&[(p, 1.0)], seen, 1.0 / (alike * CONTOURS_PHASE_SD.powi(2)));
                     continue;
                 }
                 let Some(feet) = feet else { continue };
@@ -353,11 +361,7 @@ impl Frontal {
                 let off_m = ahead_m - reach_m;
                 let weight = 1.0 / (1.0 + off_m * off_m / (CAUCHY_SD * CAUCHY_SD * variance));
                 let right = off_m + (1.0 + by_place) * along_m + by_phase * phase;
-                arrow.add_row(
-                    &[(x, 1.0 + by_place), (p, by_phase)],
-                    right,
-                    weight / (LIKE_FRAMES * variance),
-                );
+                arrow.add_row(&[(x, 1.0 + by_place), (p, by_phase)], right, weight / (alike * variance));
             }
             for k in 1..count.saturating_sub(1) {
                 let time_s = |k: usize| self.paces[from + k].time_s;
@@ -383,6 +387,11 @@ impl Frontal {
         }
         variances
     }
+}
+
+/// How many residuals of points in order of time are alike.
+fn alike(points: &[(f64, f64)]) -> f64 {
+    LIKE_FRAMES * more(mean_interval_s(points.iter().map(|(time_s, _)| *time_s)))
 }
 
 #[cfg(test)]

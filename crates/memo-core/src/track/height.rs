@@ -29,8 +29,10 @@ const MOST_POPULATION_SD: f64 = 3.5;
 /// A given height that is farther from a measured one contradicts it, standard deviations.
 const CONTRADICTION_SD: f64 = 3.0;
 
-/// Rectangles of people are not taller, metres.
+/// Rectangles of people are not taller, metres, nor lower, unless a height is given; then this share of it.
 const TALLEST_M: f64 = 2.4;
+const SMALLEST_M: f64 = 1.0;
+const OF_GIVEN: f64 = 0.8;
 
 /// Where a height comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -152,9 +154,15 @@ fn height_of(camera: &Camera, sighting: &Sighting) -> Option<f64> {
     height_on_ground(camera, &midpoints, weight).ok()
 }
 
-/// True if a rectangle that stands on the ground can enclose a person: 1.0 to 2.4 m.
-pub(super) fn is_of_a_person(camera: &Camera, sighting: &Sighting) -> bool {
-    height_of(camera, sighting).is_some_and(|height_m| (1.0..TALLEST_M).contains(&height_m))
+/// True if a rectangle that stands on the ground can enclose a person: 1.0 to 2.4 m, or nearly as small as the smallest
+/// of the given heights.
+pub(super) fn is_of_a_person(
+    camera: &Camera,
+    sighting: &Sighting,
+    given_m: impl Iterator<Item = f64>,
+) -> bool {
+    let least_m = given_m.map(|height_m| OF_GIVEN * height_m).fold(SMALLEST_M, f64::min);
+    height_of(camera, sighting).is_some_and(|height_m| (least_m..TALLEST_M).contains(&height_m))
 }
 
 /// The height of a person whose rectangles stand on the ground; `average` walks with the share of the height by which
@@ -268,6 +276,16 @@ mod tests {
         }
         let small = start_height(&options, None, options.camera.as_ref(), &sightings(&camera(), 1.2));
         assert_eq!(small, BodyHeight::POPULATION, "not the height of an adult");
+    }
+
+    #[test]
+    fn what_is_lower_than_adults_is_a_person_of_a_given_height_alone() {
+        let is_one = |height_m: f64, given_m: &[f64]| {
+            is_of_a_person(&camera(), &sightings(&camera(), height_m)[0], given_m.iter().copied())
+        };
+        assert!(is_one(1.7, &[]) && is_one(1.1, &[1.8]) && is_one(1.7, &[0.9]));
+        assert!(!is_one(0.9, &[]) && !is_one(0.9, &[1.8]) && is_one(0.9, &[1.8, 0.95]));
+        assert!(!is_one(0.5, &[0.95]) && !is_one(2.6, &[2.5]));
     }
 
     #[test]

@@ -10,6 +10,7 @@ use super::decisions::{HINDSIGHT_GAIN, PLACE_M, SLOWEST_MPS};
 use super::frontal::{Frontal, Lowest};
 use super::locate::Sighting;
 use super::options::TrackerOptions;
+use super::rate::lasting;
 use super::route::Route;
 use super::standing::Standing;
 use super::trail::{Anchor, CORNER_JERK_SD, JERK_SD, Trail};
@@ -17,7 +18,7 @@ use super::walk::FrameEdges;
 use glam::DVec2;
 use std::ops::Range;
 
-/// Number of places of the walk to which the curve is joined.
+/// Number of places of the walk to which the curve is joined, here and below at the usual rate.
 const ANCHORS: usize = 10;
 /// Distance of the points of a route that is continued, metres.
 const POINTS_M: f64 = 0.05;
@@ -35,7 +36,7 @@ impl Active {
         let Some((route, places)) = self.route_from(&earlier) else { return };
         let mut frontal = self.recorded().moved_to(&route);
         let before: Vec<_> = earlier.kept.iter().zip(places).rev().collect();
-        for some in before.chunks(AT_ONCE) {
+        for some in before.chunks(lasting(AT_ONCE, self.every_s())) {
             for ((sighting, edges), place) in some {
                 let all = earlier.feet.get(&edges.frame).copied();
                 frontal.precede(edges.time_s, &Lowest { firm: *sighting, all }, *place);
@@ -69,7 +70,8 @@ impl Active {
         let first = joined.steps().first()?.frame;
         joined.kept.retain(|(_, edges)| edges.frame >= first);
         let count = joined.steps().len();
-        if count < ANCHORS || joined.is_frontal() || self.kept.len() != whole {
+        let anchored = lasting(ANCHORS, joined.every_s());
+        if count < anchored || joined.is_frontal() || self.kept.len() != whole {
             return None;
         }
         let last = joined.steps()[count - 1].frame;
@@ -85,20 +87,20 @@ impl Active {
             let step = &joined.steps()[k];
             Anchor { time_s: step.time_s, place_m: joined.walk.route.place(step.state.along.position) }
         };
-        let anchors: Vec<Anchor> = (count - ANCHORS..count).map(anchor).collect();
+        let anchors: Vec<Anchor> = (count - anchored..count).map(anchor).collect();
         let crown = joined.crown();
         let trail = Trail::new(joined.rows, &anchors, &sightings, &joined.camera, &crown);
         let points = trail.curve(CORNER_JERK_SD);
-        let from_m = joined.steps()[count - ANCHORS].state.along.position;
+        let from_m = joined.steps()[count - anchored].state.along.position;
         let route = joined.walk.route.continued(&points, from_m)?;
-        let is_near = points.get(ANCHORS)?.distance(anchors[ANCHORS - 1].place_m) < PLACE_M;
+        let is_near = points.get(anchored)?.distance(anchors[anchored - 1].place_m) < PLACE_M;
         if !is_at_once || !is_near {
             return None;
         }
         // 3. The feet on it, with the steps of the walk.
         joined.feet.extend(later.feet.iter().map(|(frame, feet)| (*frame, *feet)));
         let mut frontal = joined.recorded().moved_to(&route);
-        for some in since.chunks(AT_ONCE) {
+        for some in since.chunks(lasting(AT_ONCE, joined.every_s())) {
             for (sighting, edges) in some {
                 frontal.push(edges.time_s, &joined.lowest(*sighting, edges.frame));
             }
@@ -132,7 +134,8 @@ impl Active {
             time_s: -steps[k].time_s,
             place_m: self.walk.route.place(steps[k].state.along.position),
         };
-        let anchors: Vec<Anchor> = (0..ANCHORS.min(steps.len())).rev().map(anchor).collect();
+        let anchored = lasting(ANCHORS, self.every_s()).min(steps.len());
+        let anchors: Vec<Anchor> = (0..anchored).rev().map(anchor).collect();
         let backwards: Vec<Sighting> =
             earlier.sightings().iter().rev().map(|s| Sighting { time_s: -s.time_s, ..*s }).collect();
         let trail = Trail::new(self.rows, &anchors, &backwards, &self.camera, &self.crown());

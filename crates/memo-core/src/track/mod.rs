@@ -25,6 +25,7 @@ pub mod normal_gait;
 pub(crate) mod options;
 mod people;
 pub mod plausible;
+mod rate;
 pub(crate) mod result;
 pub mod route;
 pub mod score;

@@ -56,12 +56,14 @@ pub struct TrackerOptions {
     pub field_of_view_rad: Option<f64>,
     /// Average gait.
     pub gait: GaitChoice,
-    /// Number of frames of the starting phase. The paper uses images 2 to 14.
+    /// Number of frames of the starting phase. The paper uses images 2 to 14. At more than 30 frames per second, as many frames
+    /// as last as long.
     pub start_frames: usize,
     /// Fit of the person's body and motion to all frames of a walk; `None` keeps the average.
     pub fit: Option<FitOptions>,
     /// Number of frames that must be followed before an oblique path is looked for. 40: one and a half strides at
-    /// 25 frames per second. At lower rates fewer frames are enough, if they last as long.
+    /// 25 frames per second. At lower rates fewer frames are enough, if they last as long; at more than 30 frames per second, it
+    /// is as many as last as long.
     pub path_frames: usize,
     /// Whether the person walks on a treadmill; `None` finds out.
     pub treadmill: Option<bool>,

@@ -43,8 +43,6 @@ pub struct TrackedWalk {
     pub depth_sd_m: f64,
     /// Report of the starting phase.
     pub start: StartReport,
-    /// The speed for which the average gait was made, m/s.
-    pub gait_speed_mps: f64,
     /// Whether the person walks on a treadmill ([`TrackedWalk::treadmill`]).
     pub is_on_treadmill: bool,
     /// Whether the person walks towards the camera or away from it: then the feet show place and phase, left and right
@@ -445,7 +443,8 @@ impl Coordinate {
         let smoothed = smooth(&filtered, dt_s, noise);
         let ratio = |k: usize| {
             let prior = filtered[k - 1].predict(dt_s[k - 1], noise);
-            let z = measured(steps[k].measured.as_ref()?, prior.position);
+            // What the feet say was filtered with them.
+            let z = measured(steps[k].measured.as_ref().filter(|_| !steps[k].by_feet)?, prior.position);
             Some((z - prior.position).powi(2) / (prior.covariance[0] + noise.measurement_variance))
         };
         let ratios: Vec<f64> = (1..steps.len()).filter_map(ratio).collect();

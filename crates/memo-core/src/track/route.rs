@@ -68,13 +68,18 @@ impl Route {
     /// The route up to the length `along_m`, and from there through points; `None` for fewer than three different ones.
     pub fn continued(&self, points: &[DVec2], along_m: f64) -> Option<Self> {
         let new = Self::through(points, along_m)?;
-        let before = self.knots.iter().copied().take_while(|knot| knot.along_m < along_m);
-        let start = if self.knots.first().is_some_and(|knot| knot.along_m < along_m) {
-            self.start
-        } else {
-            new.start
-        };
-        Some(Self { start, knots: before.chain(new.knots).collect() })
+        let mut before: Vec<Knot> =
+            self.knots.iter().copied().take_while(|knot| knot.along_m < along_m).collect();
+        if before.is_empty() {
+            // It is straight up to there.
+            let from_m = along_m - STRAIGHT_BEFORE_M;
+            before.push(Knot {
+                along_m: from_m,
+                place: self.place(from_m),
+                heading_rad: self.start.heading_rad,
+            });
+        }
+        Some(Self { start: self.start, knots: before.into_iter().chain(new.knots).collect() })
     }
 
     /// True for a straight path.
@@ -147,6 +152,8 @@ impl Route {
 
 /// Points nearer to each other are one, metres.
 const LEAST_CHORD_M: f64 = 0.01;
+/// A straight route that goes on elsewhere is left as it is up to so far before, metres.
+const STRAIGHT_BEFORE_M: f64 = 0.3;
 /// The foot of a perpendicular on a curve is found on tangents, one after the other.
 const FOOT_STEPS: usize = 4;
 
@@ -275,6 +282,14 @@ mod tests {
         assert!(new.place(1.5).distance(DVec2::new(1.5, 0.0)) < 1e-6);
         assert!(new.place(4.0).distance(DVec2::new(2.0, 2.0)) < 1e-6);
         assert!((turn(&new, 0.5, 4.0) - FRAC_PI_2).abs() < 1e-6);
+        // A straight route keeps what lies before, but for a short way to the new points.
+        let new = Route::from(Path { origin: DVec2::ZERO, heading_rad: 0.0 }).continued(&north, 2.0).unwrap();
+        for k in -20..=17 {
+            let along_m = 0.1 * f64::from(k);
+            assert!(new.place(along_m).distance(DVec2::new(along_m, 0.0)) < 1e-9, "{along_m}");
+        }
+        assert!(new.place(4.0).distance(DVec2::new(2.0, 2.0)) < 1e-6);
+        assert!((turn(&new, 1.7, 4.0) - FRAC_PI_2).abs() < 1e-6);
     }
 
     #[test]

@@ -36,9 +36,10 @@ impl Active {
 
     /// Starts again on an oblique path if the sightings show one and the contours fit it better.
     fn turn_path(&mut self, kept: &Kept, options: &TrackerOptions) {
-        let sightings: Vec<Sighting> = kept.iter().filter_map(|(sighting, _)| *sighting).collect();
+        let (sightings, mut frames): (Vec<Sighting>, Vec<&FrameEdges>) =
+            kept.iter().filter_map(|(sighting, edges)| Some(((*sighting)?, edges))).unzip();
         let Some(course) = locate_slanting(&sightings, &self.camera, &self.crown()) else { return };
-        let frames: Vec<&FrameEdges> = kept.iter().map(|(_, e)| e).take(options.start_frames).collect();
+        frames.truncate(options.start_frames);
         let walker = &self.walk.walker;
         if let Some(start) = start(&frames, &course, walker, &self.camera, &options.cadence, &options.walk) {
             let straight = self.walk.clone();

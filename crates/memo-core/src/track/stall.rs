@@ -7,6 +7,7 @@
 use super::active::{Active, Kept};
 use super::locate::{Crown, Sighting, locate};
 use super::options::TrackerOptions;
+use super::rate::latest;
 use super::start::{StartReport, start};
 use super::walk::{FrameEdges, Walk};
 use crate::model::{GaitStyle, Walker};
@@ -16,7 +17,7 @@ const SMALLER_STEPS: [GaitStyle; 2] = [GaitStyle::SHORT_STEPS, GaitStyle::SHUFFL
 /// A phase that moves on more slowly in the last frames stands still, gait cycles per second. Walks start with 0.65 and
 /// more. Chosen, with no margin measured: what seems to stand still is only started again.
 const STALLED_HZ: f64 = 0.45;
-/// Number of last frames that decide.
+/// Number of last frames that decide, at the usual rate.
 const LAST_FRAMES: usize = 20;
 
 impl Active {
@@ -56,8 +57,8 @@ impl Active {
 /// True if the phase stands still in the last frames.
 fn stalls(walk: &Walk) -> bool {
     let steps = walk.steps();
-    let Some(first) = steps.len().checked_sub(LAST_FRAMES).map(|k| &steps[k]) else { return false };
-    let last = &steps[steps.len() - 1];
+    let Some(recent) = latest(steps, LAST_FRAMES) else { return false };
+    let (first, last) = (&recent[0], &recent[recent.len() - 1]);
     let cycles = (last.state.phase.position - first.state.phase.position).abs();
     cycles < STALLED_HZ * (last.time_s - first.time_s)
 }

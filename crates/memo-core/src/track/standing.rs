@@ -2,6 +2,7 @@
 
 use super::fit::views::Piece;
 use super::locate::Sighting;
+use super::rate::{lasting, mean_interval_s};
 use super::walk::FrameEdges;
 use crate::image::Rectangle;
 use std::collections::BTreeMap;
@@ -40,16 +41,26 @@ impl Standing {
         edges: FrameEdges,
         piece: Option<Piece>,
     ) -> Self {
+        let most_missed = self.most_missed();
         let is_there = |k: &(Option<Sighting>, FrameEdges)| k.0.is_some();
         let missed = self.kept.iter().rev().take_while(|k| !is_there(k)).count();
-        let is_left = self.kept.last().is_some_and(|(_, last)| last.frame + MISSED_FRAMES < edges.frame);
-        let is_gone = missed >= MISSED_FRAMES || is_left;
+        let is_left = self.kept.last().is_some_and(|(_, last)| last.frame + most_missed < edges.frame);
+        let is_gone = missed >= most_missed || is_left;
         let is_elsewhere = self.kept.last().is_some_and(|(_, last)| last.window.gap(&edges.window) != [0, 0]);
         let mut standing = if is_gone || is_elsewhere { Self::default() } else { self };
         standing.feet.extend(feet.map(|feet| (edges.frame, feet)));
         standing.kept.push((sighting, edges));
         standing.pieces.extend(piece);
         standing
+    }
+
+    fn most_missed(&self) -> usize {
+        lasting(MISSED_FRAMES, self.every_s())
+    }
+
+    /// Mean time from frame to frame, seconds.
+    pub(super) fn every_s(&self) -> f64 {
+        mean_interval_s(self.kept.iter().map(|(_, edges)| edges.time_s))
     }
 
     /// Time from the first frame to the last, seconds.
@@ -72,7 +83,8 @@ impl Standing {
         self.kept.retain(|(_, edges)| edges.frame < frame);
         self.pieces.retain(|piece| piece.frame < frame);
         self.feet.retain(|seen, _| *seen < frame);
-        let is_left = self.kept.last().is_none_or(|(_, edges)| edges.frame + MISSED_FRAMES < frame);
+        let most_missed = self.most_missed();
+        let is_left = self.kept.last().is_none_or(|(_, edges)| edges.frame + most_missed < frame);
         if is_left { Self::default() } else { self }
     }
 

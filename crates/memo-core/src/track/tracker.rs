@@ -32,7 +32,7 @@ mod starting;
 mod unfollowed;
 
 use super::active::Active;
-use super::candidate::{Candidate, Seen};
+use super::candidate::{Candidate, MISSED_FRAMES, Seen};
 use super::evidence::{Evidence, EvidenceError, EvidenceOptions, EvidenceStream};
 use super::fit::views::Backdrop;
 use super::left_out::{LeftOut, Unfollowed};
@@ -40,6 +40,7 @@ use super::locate::Sighting;
 use super::options::TrackerOptions;
 use super::people::Identities;
 pub use super::people::Now;
+use super::rate::{FrameRate, lasting};
 use super::result::TrackedWalk;
 use super::standing::Standing;
 use super::steady::{CameraMotion, Loss};
@@ -116,8 +117,10 @@ pub struct SeekReport {
     pub frames_with_candidate: usize,
     /// Of these, frames in which the image border cut the region.
     pub frames_cut_off: usize,
-    /// Refused starts: the region moved too slowly, did not fit the height, or did not walk.
+    /// Refused starts: the region moved too slowly, did not fit the height, or did not walk. Walks that were taken back count too.
     pub refused_starts: usize,
+    /// Frames of a starting phase at the rate of the frames.
+    pub start_frames: usize,
     /// People and things that moved and were not followed ([`Tracker::left_out`]).
     pub left_out: usize,
     /// The light: frames whose brightness differed suddenly and was made that of the others.
@@ -127,7 +130,13 @@ pub struct SeekReport {
 /// A tracker for one stream of frames.
 #[derive(Debug)]
 pub struct Tracker {
+    /// As they were given, but numbers of frames are those of the frame rate.
     options: TrackerOptions,
+    /// Numbers of start and path frames as they were given.
+    given_frames: [usize; 2],
+    rate: FrameRate,
+    /// What is sought is dropped after this many consecutive frames without it.
+    most_missed: usize,
     stream: EvidenceStream,
     backdrop: Backdrop,
     candidates: Vec<Candidate>,
@@ -167,11 +176,15 @@ impl Tracker {
         options.check()?;
         let stream = options.evidence_stream();
         let longest_walk = options.fit.map_or(LONGEST_WALK, |fit| fit.longest.min(LONGEST_WALK));
+        let given_frames = [options.start_frames, options.path_frames];
         let order_of_heights = (0..=options.further_heights_m.len()).collect();
         Ok(Self {
             options,
             stream,
             backdrop: Backdrop::default(),
+            given_frames,
+            rate: FrameRate::default(),
+            most_missed: MISSED_FRAMES,
             candidates: Vec::new(),
             sought: Vec::new(),
             side_by_side: Vec::new(),
@@ -197,12 +210,17 @@ impl Tracker {
             return Err(TrackError::Finished);
         }
         self.check_camera(frame)?;
-        self.report.frames += 1;
         let evidence = self.stream.push(frame, time_s)?;
+        self.report.frames += 1;
+        if let Some(every_s) = self.rate.push(time_s) {
+            let [start_frames, path_frames] = self.given_frames.map(|count| lasting(count, every_s));
+            (self.options.start_frames, self.options.path_frames) = (start_frames, path_frames);
+            self.most_missed = lasting(MISSED_FRAMES, every_s);
+        }
         if let Some(loss) = self.stream.take_loss() {
             self.end_view(&loss);
         }
-        evidence.map_or(Ok(()), |evidence| self.advance(&evidence))
+        evidence.iter().try_for_each(|evidence| self.advance(evidence))
     }
 
     /// The same with boxes around the people in the frame, from a detector or another tracker: nobody is looked for
@@ -224,6 +242,8 @@ impl Tracker {
             return Err(TrackError::Box { given: *given, width, height });
         }
         let number = self.stream.frame_count();
+        // Those of frames whose view was lost are never asked for.
+        self.boxes = self.boxes.split_off(&number.saturating_sub(1));
         self.boxes.insert(number, boxes.to_vec());
         self.update(frame, time_s).inspect_err(|_| {
             self.boxes.remove(&number);
@@ -233,9 +253,8 @@ impl Tracker {
     /// Ends the stream: processes the last frame and ends the current walk.
     pub fn finish(&mut self) -> Result<(), TrackError> {
         self.is_finished = true;
-        if let Some(evidence) = self.stream.finish()? {
-            self.advance(&evidence)?;
-        }
+        let evidence = self.stream.finish()?;
+        evidence.iter().try_for_each(|evidence| self.advance(evidence))?;
         self.end_everybody();
         self.unfollowed.finish(self.options.start_frames);
         Ok(())
@@ -274,7 +293,12 @@ impl Tracker {
 
     /// Counts of candidates and refused starts so far.
     pub fn seek_report(&self) -> SeekReport {
-        SeekReport { left_out: self.unfollowed.count(), light: self.stream.light(), ..self.report }
+        SeekReport {
+            left_out: self.unfollowed.count(),
+            light: self.stream.light(),
+            start_frames: self.options.start_frames,
+            ..self.report
+        }
     }
 
     /// Who or what moved and was not followed, with the reason, in order of the first frames. The list is complete after

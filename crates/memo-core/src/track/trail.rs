@@ -4,6 +4,7 @@
 //! changing acceleration. Of somebody who goes straight, a straight path explains them as well, at whatever speed.
 
 use super::locate::{Crown, Rows, Sighting, foot};
+use super::rate::{mean_interval_s, more};
 use crate::estimate::arrow::{Arrow, velocity_change};
 use crate::estimate::smooth::Measured;
 use crate::model::Camera;
@@ -20,10 +21,8 @@ pub(super) const CORNER_JERK_SD: f64 = 1.0;
 const ACCELERATION_SD: f64 = 0.5;
 /// Rounds in which a straight path and the places on it are fitted in turn.
 const LINE_STEPS: usize = 5;
-/// Errors of so many neighbouring rectangles are alike, arms and feet stay where they are for some frames; and for so
-/// many seconds, if frames follow faster.
+/// Errors of so many neighbouring rectangles are alike, at the usual rate: arms and feet stay where they are for some frames.
 const LIKE_FRAMES: f64 = 4.0;
-const LIKE_S: f64 = 0.16;
 
 /// A place on the route so far.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -56,13 +55,14 @@ impl Trail {
             anchors.iter().map(move |anchor| Measured { value: axis.dot(anchor.place_m), sd: ANCHOR_SD_M })
         };
         let mut places = axes.map(|axis| anchored(axis).collect::<Vec<_>>());
+        let alike = LIKE_FRAMES * more(mean_interval_s(sightings.iter().map(|s| s.time_s)));
         for sighting in sightings {
             let Ok(foot) = foot(rows, sighting, camera, crown) else { continue };
             times_s.push(sighting.time_s);
             for (axis, places) in axes.iter().zip(&mut places) {
                 let value = axis.dot(foot.point_in_world.truncate());
                 let variance = axis.extend(0.0).dot(foot.covariance * axis.extend(0.0));
-                places.push(Measured { value, sd: (LIKE_FRAMES * variance).sqrt() });
+                places.push(Measured { value, sd: (alike * variance).sqrt() });
             }
         }
         Self { times_s, axes, places }
@@ -102,11 +102,8 @@ impl Trail {
     /// How much more likely the places are on their curve than on any straight path, as the logarithm of the ratio. On the
     /// path the speed may change as much as on the curve: who slows down, stops or sets off does not turn.
     pub fn turn_gain(&self) -> f64 {
-        let (Some(first_s), Some(last_s)) = (self.times_s.first(), self.times_s.last()) else { return 0.0 };
-        let every_s = (last_s - first_s) / self.times_s.len() as f64;
         let on_curve = self.places.each_ref().map(|places| smoothed(&self.times_s, places, JERK_SD));
-        let gain = self.cost_of(&self.on_a_line()) - self.cost_of(&on_curve);
-        gain * (LIKE_FRAMES * every_s / LIKE_S).min(1.0)
+        self.cost_of(&self.on_a_line()) - self.cost_of(&on_curve)
     }
 
     /// How far the places are from others, as minus the logarithm of their likelihood.
@@ -205,6 +202,20 @@ pub(super) mod tests {
             DVec2::new(-0.6, 0.0) + radius_m * DVec2::new(angle.sin(), 1.0 - angle.cos())
         };
         Route::through(&(0..=80).map(point).collect::<Vec<_>>(), BEGINNING.along_m).unwrap()
+    }
+
+    /// Four times as many rectangles in the same time say no more.
+    #[test]
+    fn rectangles_tell_no_more_at_a_high_frame_rate() {
+        let crown = Crown { height_m: active(Vec::new()).walk.walker.level_crown_height_m(), sd_m: 0.02 };
+        let gain = |more: usize| {
+            let frames = frames_on(50 * more, FRAME_S / more as f64, &arc(2.5), &arc(2.5));
+            let sightings: Vec<Sighting> = frames.iter().filter_map(|(sighting, _)| *sighting).collect();
+            Trail::new(Rows::Both, &[], &sightings, &camera(), &crown).turn_gain()
+        };
+        // Up to 30 frames per second each one counts, as 20 and 30 do here.
+        let [usual, fast] = [1, 8].map(gain);
+        assert!((1.3..1.7).contains(&(fast / usual)), "{usual} {fast}");
     }
 
     #[test]

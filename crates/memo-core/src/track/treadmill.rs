@@ -17,6 +17,7 @@ use super::fit::views::Backdrop;
 use super::height::BodyHeight;
 use super::locate::Course;
 use super::options::TrackerOptions;
+use super::rate::lasting;
 use super::result::TrackedWalk;
 use super::search::{Grid, Path, Scene, search_each_phase};
 use super::standing::Standing;
@@ -115,7 +116,12 @@ impl Spot<'_> {
         if self.courses.first().is_none_or(moves_on) {
             return Err(standing);
         }
-        let frames: Vec<&FrameEdges> = standing.kept.iter().map(|(_, edges)| edges).step_by(EVERY).collect();
+        let frames: Vec<&FrameEdges> = standing
+            .kept
+            .iter()
+            .map(|(_, edges)| edges)
+            .step_by(lasting(EVERY, standing.every_s()))
+            .collect();
         let Some((course, start)) = self.start(&frames) else { return Err(standing) };
         let Self { camera, tilt, height, walker, options, .. } = self;
         let walk = Walk::new(walker.clone(), start.path, start.beginning);
@@ -123,7 +129,6 @@ impl Spot<'_> {
         Ok(Active {
             tilt: *tilt,
             depth_sd_m: course.depth_sd_m,
-            gait_speed_mps: course.speed_mps,
             kept: standing.kept,
             pieces: standing.pieces,
             feet: standing.feet,

@@ -4,6 +4,7 @@
 //! A track that starts half a cycle off does not correct itself, because its legs fit almost as well. So both
 //! twins are followed, each with its own filters, and the sums of their similarities decide between them.
 
+use super::rate::latest;
 use super::route::Route;
 use super::score::{EdgeLine, SimilarityOptions};
 use super::search::{
@@ -41,7 +42,7 @@ impl WalkOptions {
 /// largest are the paper's; the smallest keep three steps on each side.
 const HALF_WIDTHS: [(f64, f64); 3] = [(0.06, 0.2), (0.06, 0.1), (0.06, 0.2)];
 
-/// In the first frames a wrong phase is still put right in either direction: without them, right and left of one of
+/// In the first frames, at the usual rate, a wrong phase is still put right in either direction: without them, right and left of one of
 /// three drawn people became uncertain.
 const FIRST_FRAMES: usize = 13;
 
@@ -269,7 +270,7 @@ impl Walk {
             let scene = Scene::new(&self.walker, camera, &path).among(&others);
             let mut step = match_frame(edges, &scene, &predicted, options);
             let steps = &self.twins[twin].steps;
-            if let Some(before) = steps.last().filter(|_| steps.len() >= FIRST_FRAMES) {
+            if let Some(before) = steps.last().filter(|_| latest(steps, FIRST_FRAMES).is_some()) {
                 step.state.phase =
                     onward(&step.state.phase, before.state.phase.position, self.beginning.rate_hz);
             }

@@ -175,7 +175,7 @@ pub fn image_stages(
     let (mut changed, mut evidence) = (None, None);
     for (index, frame) in [before, frame, after].iter().enumerate() {
         changed = detector.push(frame).map_err(value_error)?;
-        evidence = stream.push(frame, index as f64).map_err(value_error)?;
+        evidence = stream.push(frame, index as f64).map_err(value_error)?.pop();
     }
     let (Some(changed), Some(evidence)) = (changed, evidence) else {
         return Err(PyValueError::new_err("three frames gave no evidence"));

@@ -181,6 +181,20 @@ fn a_walk_that_was_none_is_left_out_with_what_was_seen_before_it() {
     assert_eq!((found[0].first().frame, found[0].last().frame), (0, 59));
 }
 
+/// The model of somebody may be withdrawn in a frame in which the region is noticed again.
+#[test]
+fn what_is_seen_again_in_the_frame_in_which_its_walk_ended_is_one_thing() {
+    let mut unfollowed = Unfollowed::default();
+    unfollowed.withdrawn(walk_boxes(0..30), Reason::Beside);
+    for frame in 29..60 {
+        unfollowed.notice(frame, 0.04 * frame as f64, &[seen(walking(frame))]);
+    }
+    unfollowed.finish(START_FRAMES);
+    let left_out = unfollowed.left_out();
+    let frames = |left: &LeftOut| [left.shots[0].frame, left.shots[left.shots.len() - 1].frame];
+    assert_eq!(left_out.iter().map(frames).collect::<Vec<_>>(), [[0, 59]]);
+}
+
 #[test]
 fn a_thing_waits_for_the_end_of_the_walks_of_its_time() {
     let mut unfollowed = Unfollowed::default();

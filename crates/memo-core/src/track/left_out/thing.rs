@@ -209,7 +209,10 @@ impl Thing {
         let last = self.shots.last;
         let moved = middle(&shot.rectangle) - middle(&last.rectangle);
         let elapsed_s = shot.time_s - last.time_s;
-        self.velocity_px = self.velocity_px.lerp(moved / elapsed_s, NEW_VELOCITY);
+        // Whose model is withdrawn in a frame may be seen again in the same one.
+        if elapsed_s > 0.0 {
+            self.velocity_px = self.velocity_px.lerp(moved / elapsed_s, NEW_VELOCITY);
+        }
         self.shots.push(shot);
     }
 

@@ -66,7 +66,6 @@ pub fn tracked(walk: Walk, start: StartReport, options: WalkOptions) -> TrackedW
         height: BodyHeight::given(1.75),
         depth_sd_m: 0.0,
         start,
-        gait_speed_mps: 1.2,
         fit: None,
         options,
     }

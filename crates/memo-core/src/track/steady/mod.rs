@@ -302,11 +302,16 @@ impl Steadier {
     ///
     /// # Errors
     ///
-    /// The size of the frame differs from the frames before.
+    /// The size of the frame differs from the frames before, or from that of the given camera.
     pub fn push(&mut self, frame: &Frame<'_>) -> Result<Steadied, FrameError> {
         let number = self.frames;
-        if let Some(view) = &self.view {
-            view.picture.as_frame().check_same_size(frame)?;
+        let [width, height] = [frame.width(), frame.height()];
+        let camera = self.view.as_ref().map(|view| &view.camera).or(self.given.as_ref());
+        if let Some([expected_width, expected_height]) =
+            camera.map(|camera| camera.size.map(|side| side as usize))
+            && [expected_width, expected_height] != [width, height]
+        {
+            return Err(FrameError::SizeChanged { expected_width, expected_height, width, height });
         }
         self.frames += 1;
         let pyramid = Pyramid::new(*frame, levels(frame));
@@ -329,7 +334,7 @@ impl Steadier {
     /// Where a pixel of a frame is in the camera of the first frame; the same pixel if the frame was left as it is.
     pub fn in_first_view(&self, frame: usize, pixel: DVec2) -> DVec2 {
         let motion = self.motions.iter().rev().find(|motion| motion.frame == frame);
-        let moved = motion.filter(|motion| motion.state == CameraState::Turned).zip(self.view.as_ref());
+        let moved = motion.filter(|motion| motion.turn_rad != DVec3::ZERO).zip(self.view.as_ref());
         let seen = |(motion, view): (&CameraMotion, &View)| {
             let camera = &view.camera;
             let ray = ((camera.undistort(pixel).ok()? - camera.centre_px) / camera.focal_px).extend(1.0);
@@ -584,7 +589,7 @@ fn moved(camera: &Camera, turned: &Turned) -> impl Iterator<Item = (DVec2, Optio
     })
 }
 
-/// Largest and root mean square displacement over the picture, pixels.
+/// Largest and root mean square displacement over the picture, pixels; NaN if it shows nothing of the picture.
 fn displacement_px(camera: &Camera, turned: &Turned) -> [f64; 2] {
     let (mut largest, mut sum, mut count) = (0.0f64, 0.0, 0.0);
     for (place, seen) in moved(camera, turned) {
@@ -593,7 +598,7 @@ fn displacement_px(camera: &Camera, turned: &Turned) -> [f64; 2] {
         sum += off.map_or(0.0, |off| off * off);
         count += f64::from(u8::from(off.is_some()));
     }
-    [largest, (sum / f64::max(count, 1.0)).sqrt()]
+    if count == 0.0 { [f64::NAN; 2] } else { [largest, (sum / count).sqrt()] }
 }
 
 /// Share of the picture that a turned camera still shows.

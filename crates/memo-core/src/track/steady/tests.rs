@@ -251,6 +251,36 @@ fn a_black_frame_is_no_cut() {
     assert!(steadier.losses().is_empty() && steadier.take_loss().is_none());
 }
 
+/// What is left of a view is where it was, also in a frame in which nobody knows how the camera turned.
+#[test]
+fn places_are_turned_back_in_an_unknown_frame_too() {
+    let camera = camera();
+    let mut steadier = steadier(Some(&camera));
+    for turn in [[0.0; 3], [0.0, 0.06, 0.0]] {
+        pushed(&mut steadier, &Shot::of(&camera, turn).plain());
+    }
+    let (steadied, motion) = pushed(&mut steadier, &Image::filled(320, 240, 0));
+    assert!(matches!(steadied, Steadied::Moved { .. }) && motion.state == CameraState::Unknown);
+    let pixel = DVec2::new(160.0, 120.0);
+    let [known, unknown] = [1, 2].map(|frame| steadier.in_first_view(frame, pixel));
+    assert!(known.distance(pixel) > 10.0 && known.distance(unknown) < 1e-9, "{known} {unknown}");
+}
+
+/// A camera that shows nothing of the first view has not stood still.
+#[test]
+fn behind_the_first_view_nobody_knows_how_far_a_pixel_moved() {
+    let shift_px = |turn_rad: f64| displacement_px(&camera(), &matrix(DVec3::Y * turn_rad));
+    assert!(shift_px(0.0).iter().all(|px| *px < 1e-9));
+    assert!(shift_px(3.0).iter().all(|px| px.is_nan()) && shift_px(0.5)[0] > 100.0);
+}
+
+#[test]
+fn a_given_camera_is_one_of_frames_of_its_size() {
+    let small = Image::filled(300, 240, 100u8);
+    let refused = steadier(Some(&camera())).push(&small.as_frame());
+    assert!(matches!(refused, Err(FrameError::SizeChanged { expected_width: 320, width: 300, .. })));
+}
+
 #[test]
 fn a_tripod_that_is_kicked_is_found_again() {
     let camera = camera();

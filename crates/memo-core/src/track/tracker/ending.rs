@@ -206,7 +206,6 @@ impl Tracker {
             depth_sd_m: active.depth_sd_m,
             start: active.start,
             tilt: active.tilt,
-            gait_speed_mps: active.gait_speed_mps,
             is_on_treadmill: active.is_on_treadmill,
             fit,
             options: self.options.walk,

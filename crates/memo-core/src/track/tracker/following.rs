@@ -97,9 +97,8 @@ impl Tracker {
             edges.changing = changing_share(&evidence.mask, camera, own, &others);
             edges.others.clone_from(&others);
             // 3. A rectangle that nobody else is in.
-            let overlaps = |region: &&Rectangle| region.gap(&own.window) == [0, 0];
             let is_alone = meeting.iter().all(|&other| self.is_unproven(other));
-            let region = if is_alone { regions.iter().find(overlaps) } else { None };
+            let region = if is_alone { most_within(regions, &own.window) } else { None };
             let region = region.filter(|region| meeting.is_empty() || self.is_of(k, region, own));
             let sighting = region.and_then(|region| whole(region, evidence));
             let active = &mut self.people[k];
@@ -198,5 +197,35 @@ impl Tracker {
             self.identify_again(&mut active);
         }
         self.people.insert(k, joined.unwrap_or(active));
+    }
+}
+
+/// The region that overlaps a window most; `None` if none touches it.
+fn most_within<'a>(regions: &'a [Rectangle], window: &Rectangle) -> Option<&'a Rectangle> {
+    let overlap = |region: &Rectangle| region.sides(0.0).overlap(&window.sides(0.0));
+    let touching = regions.iter().filter(|region| region.gap(window) == [0, 0]);
+    touching.max_by(|a, b| overlap(a).total_cmp(&overlap(b)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Beside a larger one that reaches into the window.
+    #[test]
+    fn the_region_of_somebody_is_that_which_is_most_where_the_person_is() {
+        let boxed = |left: usize, top: usize, width: usize, height: usize| Rectangle {
+            left,
+            top,
+            right: left + width - 1,
+            bottom: top + height - 1,
+        };
+        let (window, own, nearer) =
+            (boxed(100, 100, 80, 200), boxed(110, 104, 60, 190), boxed(172, 40, 120, 330));
+        for regions in [[nearer, own], [own, nearer]] {
+            assert_eq!(most_within(&regions, &window), Some(&own));
+        }
+        assert_eq!(most_within(&[nearer], &window), Some(&nearer));
+        assert_eq!(most_within(&[boxed(300, 40, 60, 190)], &window), None);
     }
 }

@@ -1,12 +1,12 @@
 //! Step 1 of the tracker: the regions that nobody explains who is followed, and the candidates that they are added to.
 
-use super::super::candidate::{Candidate, MISSED_FRAMES, Seen};
+use super::super::candidate::{Candidate, Seen};
 use super::super::crowd::{body_box, clear_explained, keep_unowned};
 use super::super::evidence::Evidence;
 use super::super::fit::views::Piece;
 use super::super::height::{is_of_a_person, is_of_one_person};
 use super::super::left_out::Hindrance;
-use super::super::locate::{Sighting, same_person};
+use super::super::locate::{MASK_MARGIN_PX, Sighting, same_person};
 use super::unfollowed::{Moving, with_small_ones};
 use super::{TrackError, Tracker, WINDOW_MARGIN_PX, grown, whole};
 use crate::image::{GroupOptions, Mask, Rectangle, Region, group_regions_of, regions, side_by_side};
@@ -43,7 +43,9 @@ impl Tracker {
         };
         self.candidates.iter_mut().for_each(|candidate| candidate.missed += 1);
         let camera = if self.people.is_empty() { None } else { self.camera() };
-        let can_be = |sighting: &Sighting| camera.is_none_or(|camera| is_of_a_person(camera, sighting));
+        let given_m = || self.options.height_m.iter().chain(&self.options.further_heights_m).copied();
+        let can_be =
+            |sighting: &Sighting| camera.is_none_or(|camera| is_of_a_person(camera, sighting, given_m()));
         let most = if are_given { usize::MAX } else { MOST_CANDIDATES };
         let mut sightings: Vec<Sighting> = Vec::new();
         let mut hinder = |region: &Rectangle| {
@@ -72,7 +74,7 @@ impl Tracker {
                 None => self.candidates.push(Candidate { seen: vec![seen], ..Candidate::default() }),
             }
         }
-        self.candidates.retain(|candidate| candidate.missed <= MISSED_FRAMES);
+        self.candidates.retain(|candidate| candidate.missed <= self.most_missed);
         self.start(evidence);
         self.start_on_the_spot(evidence);
         self.settle_unfollowed();
@@ -166,7 +168,11 @@ impl Tracker {
         let later = self.boxes.split_off(&(evidence.frame + 1));
         let given = std::mem::replace(&mut self.boxes, later).remove(&evidence.frame)?;
         let size = [evidence.grey.width(), evidence.grey.height()];
-        let place = |r: &Rectangle| self.stream.in_first_view(evidence.frame, r, size);
+        // Changes reach above the crown, and everything expects it of their rectangles.
+        let place = |r: &Rectangle| {
+            let r = self.stream.in_first_view(evidence.frame, r, size);
+            Rectangle { top: r.top.saturating_sub(MASK_MARGIN_PX as usize), ..r }
+        };
         let mut boxes: Vec<Rectangle> = given.iter().map(place).collect();
         boxes.sort_by_key(|r| std::cmp::Reverse(r.width() * r.height()));
         Some(boxes)

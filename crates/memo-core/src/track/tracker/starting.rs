@@ -24,11 +24,10 @@ impl Tracker {
                 continue;
             }
             let order = self.order_of_heights.clone();
-            let older = candidate.set_aside(frames);
+            let mut older = candidate.set_aside(frames);
             self.order_heights(&candidate);
-            let begun = self.begun(&candidate, size);
-            let begun = match begun {
-                Err(reason) if candidate.with_older(older, &self.options) => {
+            let begun = match self.begun(&candidate, size) {
+                Err(reason) if candidate.with_older(std::mem::take(&mut older), &self.options) => {
                     self.begun(&candidate, size).map_err(|_| reason)
                 }
                 begun => begun,
@@ -56,6 +55,7 @@ impl Tracker {
                     self.report.refused_starts += 1;
                     let last = candidate.last_rectangle();
                     last.iter().for_each(|r| self.unfollowed.refuse(evidence.frame, r, reason));
+                    candidate.with_older(older, &self.options);
                     candidate.refuse(&self.options);
                     self.candidates.push(candidate);
                 }

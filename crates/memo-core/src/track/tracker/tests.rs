@@ -195,6 +195,24 @@ fn options_out_of_range_are_refused_by_name() {
     assert_eq!(refused(|o| o.start_frames = 100), None);
 }
 
+/// At 100 frames per second three times as many frames last as long as at 30.
+#[test]
+fn numbers_of_frames_are_those_of_the_frame_rate() {
+    for (every_s, start_frames, path_frames) in [(0.04, 13, 40), (0.01, 43, 133)] {
+        let given = TrackerOptions { start_frames: 13, path_frames: 40, ..options() };
+        let mut tracker = Tracker::new(given).unwrap();
+        let frame = Image::filled(SIZE[0], SIZE[1], 100u8);
+        for k in 0..20 {
+            tracker.update(&frame.as_frame(), every_s * f64::from(k)).unwrap();
+        }
+        assert_eq!(
+            (tracker.options().start_frames, tracker.options().path_frames),
+            (start_frames, path_frames)
+        );
+        assert_eq!(tracker.seek_report().start_frames, start_frames);
+    }
+}
+
 #[test]
 fn frames_of_another_size_than_the_camera_s_are_refused() {
     let small = Image::filled(320, 240, 100u8);
@@ -295,7 +313,6 @@ fn following(count: usize, along_m: f64, speed_mps: f64) -> Tracker {
     followed.walk.beginning = BEGINNING;
     tracker.people.push(Active {
         start: report(PATH, BEGINNING, Direction::Forward),
-        gait_speed_mps: 1.25,
         settled: true,
         ..followed
     });
@@ -464,7 +481,7 @@ fn what_is_handed_out_is_trimmed_and_knows_its_camera() {
     let walk = tracker.take_finished().remove(0);
     assert_eq!((walk.steps().len(), walk.steps()[0].frame), (28, 2));
     assert!(walk.tilt.is_none() && walk.camera == camera() && walk.fit.is_none());
-    assert_eq!((walk.depth_sd_m, walk.gait_speed_mps, walk.options), (0.1, 1.25, options().walk));
+    assert_eq!((walk.depth_sd_m, walk.options), (0.1, options().walk));
     let mut guessed = following(30, 0.0, 1.2);
     let tilt = tilt_of_lines(&[], [640, 480], 500.0);
     guessed.people[0].tilt = Some(tilt);
