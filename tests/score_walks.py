@@ -63,7 +63,8 @@ SYMMETRY = ("step_time_symmetry", "step_length_symmetry")
 GAIT_UNITS = {
     **{"cadence": "1/min", "speed": "m/s", "stride_time": "s", "step_time": "s"},
     **{"stride_length": "m", "step_length": "m", **dict.fromkeys(SYMMETRY, "%")},
-    **{"stance": "%", "swing": "%", "double_support": "%"},
+    **{"stance": "%", "swing": "%", "single_support": "%", "double_support": "%"},
+    **{"hip_range": "deg", "knee_range": "deg", "knee_peak": "deg"},
 }
 """Gait parameters of which `true_gait` knows the truth, with the unit that it gives them in."""
 
@@ -349,6 +350,7 @@ def true_gait(truth: gt.Columns, events: gt.Columns) -> dict[tuple[str, str], fl
             ("step_time", ""): stride_s / 2.0,
             ("step_length", ""): speed * stride_s / 2.0,
             **_true_support(events, stride_s),
+            **_true_motion(gt.true_angles_deg(truth, forward)),
         }
     foot_m = {
         side: np.interp(strikes.frames, truth["frame"], gt.points(truth, f"{code}AN_") @ forward)
@@ -364,6 +366,17 @@ def true_gait(truth: gt.Columns, events: gt.Columns) -> dict[tuple[str, str], fl
             right, left = gait[step, "right"], gait[step, "left"]
             gait[symmetry, ""] = 200.0 * (right - left) / (right + left)
     return gait
+
+
+def _true_motion(angles_deg: Mapping[str, np.ndarray]) -> dict[tuple[str, str], float]:
+    """Ranges of hip and knee and the largest flexion of the knee over the clip, degrees."""
+    motion: dict[tuple[str, str], float] = {}
+    for side in ("right", "left"):
+        hip, knee = (angles_deg[f"{side}_{joint}"] for joint in ("hip", "knee"))
+        motion["hip_range", side] = float(np.ptp(hip))
+        motion["knee_range", side] = float(np.ptp(knee))
+        motion["knee_peak", side] = float(knee.max())
+    return motion
 
 
 def _true_support(events: gt.Columns, stride_s: float) -> dict[tuple[str, str], float]:
@@ -391,7 +404,16 @@ def _true_support(events: gt.Columns, stride_s: float) -> dict[tuple[str, str], 
     if len(stances) == 2:
         support["stance", ""] = float(np.mean(stances))
     swings = {("swing", side): 100.0 - v for (name, side), v in support.items() if name == "stance"}
-    return support | swings
+    # One foot stands alone while the other swings.
+    others = {"right": "left", "left": "right"}
+    single = {
+        ("single_support", side): swings["swing", other]
+        for side, other in others.items()
+        if ("swing", other) in swings
+    }
+    if both_s:
+        single["single_support", ""] = 100.0 - support["double_support", ""]
+    return support | swings | single
 
 
 def gait_intervals(

@@ -219,12 +219,19 @@ def test_without_stated_sd_nothing_is_claimed():
 
 
 def gait_walker() -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
-    """Truth of 1 m/s, left steps of 0.4 s and 0.5 m and right steps of 0.6 s and 0.5 m."""
+    """Truth of 1 m/s, left steps of 0.4 s and 0.5 m and right steps of 0.6 s and 0.5 m.
+
+    The right thigh is at 20 degrees to and fro, the left one at 10.
+    """
     time_s = np.arange(0.0, 4.0, 1.0 / FPS)
     truth = {"frame": time_s * FPS, "time_s": time_s}
     for code in gt.JOINTS:
         truth |= {f"{code}_x_m": time_s, f"{code}_y_m": 0.0 * time_s, f"{code}_z_m": 1.0 + 0.0 * time_s}
     truth["RAN_x_m"] = time_s + 0.1  # right steps 0.6 + 0.1 m, left ones 0.4 - 0.1 m
+    to_and_fro = (-1.0) ** np.arange(time_s.size)
+    for side, swing_deg in (("R", 20.0), ("L", 10.0)):
+        truth[f"{side}KN_x_m"] = time_s + 0.4 * np.tan(np.radians(swing_deg)) * to_and_fro
+        truth[f"{side}KN_z_m"], truth[f"{side}AN_z_m"] = (height + 0.0 * time_s for height in (0.6, 0.2))
     events = [
         *[(0.4 + k, "heel_strike", "right") for k in range(3)],
         *[(0.8 + k, "heel_strike", "left") for k in range(3)],
@@ -232,6 +239,12 @@ def gait_walker() -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
         *[(0.46 + k, "toe_off", "left") for k in range(3)],  # stance 0.66 s
     ]
     return truth, table_of(events)
+
+
+def right_knee_deg(thigh_deg: float) -> float:
+    """Of a thigh of 0.4 m height over a shank of 0.4 m, the ankle 0.1 m ahead of the hip."""
+    ahead_m = 0.1 - 0.4 * np.tan(np.radians(thigh_deg))
+    return float(thigh_deg - np.degrees(np.arctan2(ahead_m, 0.4)))
 
 
 def test_true_gait_parameters_are_those_planted():
@@ -257,6 +270,16 @@ def test_true_gait_parameters_are_those_planted():
         ("swing", ""): 34.0,
         # After a right strike 0.06 s until the left toe is off, after a left one 0.26 s: 32 % of a cycle.
         ("double_support", ""): 32.0,
+        ("single_support", ""): 68.0,
+        ("single_support", "right"): 34.0,
+        ("single_support", "left"): 34.0,
+        ("hip_range", "right"): 40.0,
+        ("hip_range", "left"): 20.0,
+        # The left ankle is below the hip, so the shank leans as far back as the thigh leans forward.
+        ("knee_range", "left"): 40.0,
+        ("knee_peak", "left"): 20.0,
+        ("knee_range", "right"): right_knee_deg(20.0) - right_knee_deg(-20.0),
+        ("knee_peak", "right"): right_knee_deg(20.0),
     }
     assert gait == pytest.approx(expected, abs=1e-6)
 

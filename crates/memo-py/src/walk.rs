@@ -288,7 +288,7 @@ pub fn fit_walk(
     height_sd: Option<f64>,
     frame_sd_deg: Option<f64>,
 ) -> PyResult<Walk> {
-    let mut walk = walk.tracked()?.0.clone();
+    let walk = walk.tracked()?.0.clone();
     let image = |picture: &Bound<'_, PyAny>| frame_from_numpy(picture)?.into_image();
     let pictures: Vec<Image<u8>> = pictures.iter().map(image).collect::<PyResult<_>>()?;
     let empty = empty.map(image).transpose()?;
@@ -307,8 +307,7 @@ pub fn fit_walk(
         if let Err(FitError::Option(_) | FitError::Pictures { .. } | FitError::PictureSize { .. }) = fit {
             return fit.map(|_| walk);
         }
-        walk.fit = Some(fit);
-        Ok(walk)
+        Ok(walk.with_fit(fit))
     })?;
     Walk::of_tracked(py, walk.map_err(value_error)?)
 }

@@ -39,12 +39,13 @@
 //! camera if none is given.
 
 use super::decisions::{
-    CONTACT_COMMON_SD_S, CONTACT_SD_S, CONTACT_SIDE_SD_S, POSTURE_SD, REACH_COUNTS, REACH_SD_M,
+    CONTACT_COMMON_SD_S, CONTACT_SD_S, CONTACT_SIDE_SD_S, POSTURE_SD, RANGE_SD_RAD, REACH_COUNTS, REACH_SD_M,
     STRIKE_SD_CYCLES, TOE_OFF_COMMON_SD_S,
 };
 use super::event::EventKind;
 use super::fit::belt::Belt;
 use super::fit::contacts::Contact;
+use super::rate::{mean_interval_s, more};
 use super::result::{Row, TrackedWalk};
 use super::start::Direction;
 use super::walk::Step;
@@ -68,7 +69,7 @@ const LEAST_NEAR: usize = 3;
 /// Minimum number of frames and of cycles of a walk that has gait parameters.
 const LEAST_FRAMES: usize = 8;
 const LEAST_CYCLES: f64 = 0.5;
-/// Neighbouring frames have similar errors: this many of them count as one.
+/// Neighbouring frames have similar errors: this many of them count as one, at the usual rate.
 const FRAMES_ALIKE: f64 = 2.0;
 /// 97.5 % quantile of the normal distribution.
 pub(super) const Z: f64 = 1.959_964;
@@ -219,11 +220,16 @@ impl TrackedWalk {
         Whole::of(self).map(|whole| whole.stride_s().value)
     }
 
+    /// True if it is known which side is which.
+    fn are_sides_sure(&self) -> bool {
+        let mistakes = [self.p_swapped(), self.start.p_other_direction, self.p_other_heading()];
+        mistakes.iter().all(|&p| p <= LIKELY_MISTAKEN)
+    }
+
     /// Stance from the contacts of the fitted feet: from a strike to the toe-off of that foot, of both sides together or of
     /// one, if it is known which is which.
     fn stance(&self, whole: &Whole, side: Option<Side>) -> Option<Estimate> {
-        let is_unsure = self.p_swapped().max(self.start.p_other_direction) > LIKELY_MISTAKEN;
-        if self.direction() == Direction::Backward || side.is_some() && is_unsure {
+        if self.direction() == Direction::Backward || side.is_some() && !self.are_sides_sure() {
             return None;
         }
         let contacts = &self.fitted()?.contacts;
@@ -233,15 +239,21 @@ impl TrackedWalk {
             let next = offs.map(|c| c.time_s - strike.time_s).find(|&elapsed_s| elapsed_s > 0.0)?;
             (next < LONGEST_STEP * stride_s).then_some(next)
         };
-        let is_asked = |c: &&Contact| side.is_none_or(|side| side == c.side);
-        let strikes = contacts.iter().filter(|c| c.kind == EventKind::HeelStrike).filter(is_asked);
-        let stances: Vec<f64> = strikes.filter_map(until_off).collect();
-        let n = stances.len();
+        let of_side = |side: Side| -> Vec<f64> {
+            let own = |c: &&Contact| c.kind == EventKind::HeelStrike && c.side == side;
+            contacts.iter().filter(own).filter_map(until_off).collect()
+        };
+        let asked = side.map_or(vec![Side::Right, Side::Left], |side| vec![side]);
+        let stances: Vec<Vec<f64>> = asked.into_iter().map(of_side).filter(|own| !own.is_empty()).collect();
+        let n = stances.iter().map(Vec::len).sum::<usize>();
         if n == 0 {
             return None;
         }
-        let mean = stances.iter().sum::<f64>() / n as f64;
-        let sum_sq: f64 = stances.iter().map(|s| (s - mean).powi(2)).sum();
+        // Both sides count alike, however many stances each has.
+        let mean_of = |stances: &[f64]| stances.iter().sum::<f64>() / stances.len() as f64;
+        let means: Vec<f64> = stances.iter().map(|own| mean_of(own)).collect();
+        let mean = mean_of(&means);
+        let sum_sq: f64 = stances.iter().flatten().map(|s| (s - mean).powi(2)).sum();
         let prior_variance = 2.0 * CONTACT_SD_S.powi(2);
         let freedom = n as f64 - 1.0;
         let variance = (PRIOR_STEPS * prior_variance + sum_sq) / (PRIOR_STEPS + freedom);
@@ -256,7 +268,7 @@ impl TrackedWalk {
     /// Range and peak of a measured joint over at least a cycle, degrees; joint 0 is the hip, 1 the knee.
     fn motion(&self, side: Side, joint: usize) -> Option<JointMotion> {
         let fit = self.fitted()?;
-        if self.p_swapped().max(self.p_other_heading()) > LIKELY_MISTAKEN {
+        if !self.are_sides_sure() {
             return None;
         }
         let index = usize::from(side == Side::Left);
@@ -278,18 +290,16 @@ impl TrackedWalk {
             n: cycles as usize,
         };
         Some(JointMotion {
-            range: estimate(most - least, std::f64::consts::SQRT_2 * sd),
+            range: estimate(most - least, (std::f64::consts::SQRT_2 * sd).hypot(RANGE_SD_RAD[joint])),
             peak: estimate(most, sd),
         })
     }
 
     /// Steps by side; `None` if the sides are ambiguous, the walk is backward or the fit failed.
     fn sides(&self, whole: &Whole) -> Option<Sides> {
-        let mistakes = [self.p_swapped(), self.start.p_other_direction, self.p_other_heading()];
-        let is_sure = mistakes.iter().all(|&p| p <= LIKELY_MISTAKEN);
         // Without the fit that was wanted, contacts are those of the average gait, and a hidden leg looks like an uneven step.
         let is_misfit = matches!(self.fit, Some(Err(_)));
-        if !is_sure || is_misfit || self.direction() == Direction::Backward {
+        if !self.are_sides_sure() || is_misfit || self.direction() == Direction::Backward {
             return None;
         }
         let strikes = match self.fitted() {
@@ -495,6 +505,7 @@ fn strikes(steps: &[Step], rate_hz: f64) -> Vec<Strike> {
     let phases: Vec<(f64, f64)> = steps.iter().filter_map(|s| Some((s.time_s, unwrapped(s)?))).collect();
     let (slope, level) = line_through(&phases);
     let at = |step: &Step| level + slope * step.time_s;
+    let alike = FRAMES_ALIKE * more(mean_interval_s(phases.iter().map(|(time_s, _)| *time_s)));
     let (Some(first), Some(last)) = (steps.first().map(at), steps.last().map(at)) else { return Vec::new() };
     let strike = |index: i64| {
         let mark = 0.5 * index as f64;
@@ -510,7 +521,7 @@ fn strikes(steps: &[Step], rate_hz: f64) -> Vec<Strike> {
         let count = times.len();
         let time_s = 0.5 * (times[(count - 1) / 2] + times[count / 2]);
         let sum_sq: f64 = times.iter().map(|t| (t - time_s).powi(2)).sum();
-        let independent = (count as f64 / FRAMES_ALIKE).max(1.0);
+        let independent = (count as f64 / alike).max(1.0);
         let side = if index.rem_euclid(2) == 0 { Side::Right } else { Side::Left };
         Some(Strike { side, index, time_s, variance_s2: sum_sq / (count - 1) as f64 / independent })
     };

@@ -72,6 +72,9 @@ impl Tracked<'_> {
         p_swapped: Option<f64>,
     ) -> Result<WalkFit, FitError> {
         let mut frames = self.frames(views);
+        if frames.is_empty() {
+            return Err(FitError::Frontal);
+        }
         let tracked_m: Vec<f64> = frames.iter().map(|frame| frame.start.along_m).collect();
         let ends_m = self.ends_m();
         let route = fitted_route(self.camera, self.average, &self.walk.route, ends_m, &mut frames, options);
@@ -348,6 +351,14 @@ impl WalkFit {
 }
 
 impl TrackedWalk {
+    /// The walk with another fit, and with the height that it measured, unless one was given.
+    #[must_use]
+    pub fn with_fit(self, fit: Result<WalkFit, FitError>) -> Self {
+        let measured = fit.as_ref().ok().and_then(|fit| fit.height);
+        let height = measured.filter(|_| self.height.source != HeightSource::Given).unwrap_or(self.height);
+        Self { height, fit: Some(fit), ..self }
+    }
+
     /// Fits the person again to pictures of one's own: the frames with other options, cleaned frames, or silhouettes
     /// from a segmentation, white before a black `empty` scene. The walk keeps the fit it has.
     ///
@@ -469,6 +480,26 @@ mod tests {
         };
         let views = frames.into_iter().map(|frame| frame.view).collect();
         tracked.fit(views, &FitOptions::default(), Some(0.1)).unwrap()
+    }
+
+    /// Of such a walk the contours show nothing, whatever is known of it.
+    #[test]
+    fn a_walk_of_feet_alone_is_not_fitted() {
+        let walk = crate::track::result::tests::beside(0.0, 0, 30);
+        let mut by_feet = walk.clone();
+        by_feet.walk.twins.iter_mut().flat_map(|twin| &mut twin.steps).for_each(|step| step.by_feet = true);
+        let [width, height] = walk.camera.size.map(|side| side as usize);
+        let pictures = vec![Image::filled(width, height, 100u8); 30];
+        for is_frontal in [false, true] {
+            let walk = TrackedWalk { is_frontal, ..by_feet.clone() };
+            assert_eq!(walk.fit(&pictures, None, &FitOptions::default()), Err(FitError::Frontal));
+        }
+        // What is left of a walk that turned into the line of sight.
+        let mut turned = walk;
+        turned.walk.twins[0].steps[10..].iter_mut().for_each(|step| step.by_feet = true);
+        let kept = |first: usize, last: usize| turned.clone().outside([first, last], 1).unwrap();
+        let frame = |k: usize| turned.walk.steps()[k].frame;
+        assert!(kept(0, frame(9)).is_frontal && !kept(frame(20), frame(29)).is_frontal);
     }
 
     /// A sixth too far or too near, the fit alone seeks the feet in the shanks or below the shoes.

@@ -6,7 +6,7 @@ use super::super::super::decisions::{
     ZERO_SD,
 };
 use super::super::belt::{self, Belt};
-use super::super::contacts::{self, Feet};
+use super::super::contacts::{self, Contact, Feet};
 use super::super::unknowns::{
     self, ANGLES, FRAME, FRAME_ALONG, FRAME_HEIGHT, FRAME_PHASE, JOINTS, Prior, STATURE, TORSO, Unknowns,
     WHOLE, WHOLE_ACROSS, WHOLE_BEND, WHOLE_HEADING, WHOLE_LEAN, body, excess, posture, slopes,
@@ -16,6 +16,7 @@ use super::{Fitted, Problem};
 use crate::estimate::arrow::Covariance;
 use crate::estimate::median::median;
 use crate::model::body::Part;
+use crate::track::event::EventKind;
 use crate::track::height::{BodyHeight, HeightSource};
 use glam::DVec2;
 use rayon::prelude::*;
@@ -32,11 +33,15 @@ pub(super) fn arms_seen(quality: &FitQuality) -> [[bool; JOINTS]; 2] {
 }
 
 impl Problem<'_> {
-    /// How much of a measured zero of the phase is believed: contacts of small people are blurred, and the average
+    /// The zero of the phase by the contacts, and its standard deviation: contacts of small people are blurred, and the average
     /// curves have their zero within ZERO_SD of a person's.
-    fn share_of_zero(&self, quality: &FitQuality) -> f64 {
+    fn zero(&self, contacts: &[Contact], times_s: &[f64], phases: &[f64], quality: &FitQuality) -> [f64; 2] {
+        if !contacts.iter().any(|contact| contact.kind == EventKind::HeelStrike) {
+            return [0.0, ZERO_SD];
+        }
         let blur = ZERO_BLUR_PX / quality.height_px;
-        ZERO_SD.powi(2) / (ZERO_SD.powi(2) + blur.powi(2))
+        let share = ZERO_SD.powi(2) / (ZERO_SD.powi(2) + blur.powi(2));
+        [share * contacts::mean_phase(contacts, times_s, phases), share.sqrt() * blur]
     }
 
     pub(super) fn quality(&self, fitted: &Fitted) -> FitQuality {
@@ -118,17 +123,25 @@ impl Problem<'_> {
         if let Some(belt) = belt {
             belt::move_with(&mut feet, &times_s, ahead[0] * belt.speed_mps);
         }
-        let contacts = contacts::contacts(&times_s, &phases, &feet, &ahead);
+        // Feet that stand move with a belt, and how fast nobody knows without one.
+        let are_still = belt.is_some() || !self.is_on_treadmill;
+        let contacts =
+            if are_still { contacts::contacts(&times_s, &phases, &feet, &ahead) } else { Vec::new() };
         // Phase 0 is the initial contact where the feet show it, and not where the average curves have it.
-        let zero = contacts::mean_phase(&contacts, &times_s, &phases) * self.share_of_zero(&quality);
-        all.iter_mut().for_each(|frame| frame.phase -= zero);
+        let [zero, zero_sd] = self.zero(&contacts, &times_s, &phases, &quality);
+        for frame in &mut all {
+            frame.phase -= zero;
+            frame.sd[3] = frame.sd[3].hypot(zero_sd);
+        }
+        let mut mean_sd = self.mean_sd(fitted, &all);
+        mean_sd.place[3] = mean_sd.place[3].hypot(zero_sd);
         let curves = unknowns::curves(&self.walker.gait, whole, zero);
         WalkFit {
             body: body(&self.walker.body, whole),
             height: self.height(fitted, covariance, &quality),
             route,
             curves,
-            mean_sd: self.mean_sd(fitted, &all),
+            mean_sd,
             frames: all,
             contacts,
             p_swapped,
