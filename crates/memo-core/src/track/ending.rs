@@ -297,11 +297,9 @@ mod tests {
     #[test]
     fn a_walk_ends_after_the_same_time_at_a_high_frame_rate() {
         let fast = |lost: usize| {
+            // Four times as fast, so the speeds are none at which somebody stands.
             let mut walk = ending_in(lost, 160, [1.2, 0.9], 0.0);
-            for step in &mut walk.walk.twins[0].steps {
-                step.time_s *= 0.25;
-            }
-            // As far and as many cycles in a quarter of the time.
+            walk.walk.twins[0].steps.iter_mut().for_each(|step| step.time_s *= 0.25);
             walk.is_over()
         };
         assert!(!fast(12) && fast(40));

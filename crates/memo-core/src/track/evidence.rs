@@ -227,8 +227,8 @@ impl Evidence {
 
 /// Frames at least so long before and after a frame are compared with it, seconds: at up to 33 frames per second, its neighbours.
 const COMPARED_S: f64 = 0.03;
-/// Frames compared at most, whatever their rate.
-const MOST_WAITING: usize = 16;
+/// So many frames wait at most, whatever their rate.
+pub(super) const MOST_WAITING: usize = 16;
 
 /// Evidence of a stream of frames, one frame late, or a thirtieth of a second.
 #[derive(Debug)]

@@ -33,7 +33,7 @@ mod unfollowed;
 
 use super::active::Active;
 use super::candidate::{Candidate, MISSED_FRAMES, Seen};
-use super::evidence::{Evidence, EvidenceError, EvidenceOptions, EvidenceStream};
+use super::evidence::{Evidence, EvidenceError, EvidenceOptions, EvidenceStream, MOST_WAITING};
 use super::fit::views::Backdrop;
 use super::left_out::{LeftOut, Unfollowed};
 use super::locate::Sighting;
@@ -204,7 +204,8 @@ impl Tracker {
         })
     }
 
-    /// Adds the next frame. Its evidence is processed when the frame after it arrives.
+    /// Adds the next frame. Its evidence is processed when the frame after it arrives, at more than 30 frames per second the one
+    /// that is a thirtieth of a second later.
     pub fn update(&mut self, frame: &Frame<'_>, time_s: f64) -> Result<(), TrackError> {
         if self.is_finished {
             return Err(TrackError::Finished);
@@ -243,7 +244,7 @@ impl Tracker {
         }
         let number = self.stream.frame_count();
         // Those of frames whose view was lost are never asked for.
-        self.boxes = self.boxes.split_off(&number.saturating_sub(1));
+        self.boxes = self.boxes.split_off(&number.saturating_sub(MOST_WAITING));
         self.boxes.insert(number, boxes.to_vec());
         self.update(frame, time_s).inspect_err(|_| {
             self.boxes.remove(&number);

@@ -213,6 +213,22 @@ fn numbers_of_frames_are_those_of_the_frame_rate() {
     }
 }
 
+/// However many frames wait for a later one, each has its own boxes, and none stay.
+#[test]
+fn boxes_are_those_of_their_frames_at_any_frame_rate() {
+    for (every_s, waiting) in [(0.04, 1), (0.01, 3), (0.0001, 16)] {
+        let mut tracker = tracker();
+        let frame = Image::filled(SIZE[0], SIZE[1], 100u8);
+        for k in 0..40 {
+            let boxes = [boxed(300, 400, 60, 180)];
+            tracker.update_with_boxes(&frame.as_frame(), every_s * f64::from(k), &boxes).unwrap();
+        }
+        // Nothing changes, so only a box can be a candidate.
+        assert_eq!(tracker.seek_report().frames_with_candidate, 40 - waiting, "{every_s}");
+        assert!(tracker.boxes.len() <= MOST_WAITING + 1);
+    }
+}
+
 #[test]
 fn frames_of_another_size_than_the_camera_s_are_refused() {
     let small = Image::filled(320, 240, 100u8);
