@@ -238,7 +238,8 @@ pub(in crate::track) const OFF_ACROSS_SD_M: f64 = 5.0;
 /// The same of means over the frames of a walk, in which the errors of single frames average out: of angles, of the torso's
 /// centre along, across and up and of the phase, and per share of the outline that is missed. Chosen with 82 drawn walks
 /// of six people; of the mean errors of 18 other walks of theirs, 82 to 100 % are within 1.64 of what is stated (with twice as much along
-/// the path). That of the phase comes beside the error of its zero; with both, 91 to 92 % of 76 walks are. Of the distances of the 82, 98 % are, with half as much nine tenths: where those walk, the ground is known exactly.
+/// the path). That of the phase comes beside the error of its zero; with both, 91 to 92 % of 76 walks are. Of the distances of the
+/// 82, 98 % are, with half as much nine tenths: where those walk, the ground is known exactly.
 pub(in crate::track) const MEAN_MODEL_SD_RAD: [f64; 5] = [0.010, 0.013, 0.04, 0.12, 0.155];
 pub(in crate::track) const MEAN_PLACE_SD: [f64; 4] = [0.005, 0.0, 0.040, 0.005];
 pub(in crate::track) const MEAN_OFF_SD_RAD: f64 = 0.6;
