@@ -217,21 +217,25 @@ def _found(
     for done, frame in enumerate(reader, 1):
         whole = frame.luma if shrink == 1 else np.array(frame.luma)
         found = explainer.update(whole if shrink == 1 else _memo.shrunk(whole, shrink), frame.time_s)
-        recent[done - 1] = whole
-        recent.pop(done - 1 - _MOST_WAITING, None)
+        if shrink > 1:
+            recent[done - 1] = whole
+            recent.pop(done - 1 - _MOST_WAITING, None)
         if progress is not None:
             progress(done, total)
         for each in found:  # from the frames before
-            yield each, _whole(each.luma, recent[each.frame], shrink)
+            yield each, _whole(each.luma, recent.get(each.frame), shrink)
     for each in explainer.finish():
-        yield each, _whole(each.luma, recent[each.frame], shrink)
+        yield each, _whole(each.luma, recent.get(each.frame), shrink)
 
 
 def _whole(
-    compared: npt.NDArray[np.uint8], whole: npt.NDArray[np.uint8], shrink: int
+    compared: npt.NDArray[np.uint8], whole: npt.NDArray[np.uint8] | None, shrink: int
 ) -> npt.NDArray[np.uint8]:
-    """The picture that was compared, as large as the video; a steadied one is the average, enlarged."""
-    if shrink == 1:
+    """The picture that was compared, as large as the video; a steadied one is the average, enlarged.
+
+    `whole` is the frame that was averaged; None if it was compared as it is.
+    """
+    if whole is None:
         return compared
     if np.array_equal(compared, _memo.shrunk(whole, shrink)):
         return whole

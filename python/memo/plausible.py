@@ -75,7 +75,8 @@ def given_height_sentences(given_m: Sequence[float], walks: Iterable[tuple[int, 
         )
     left_m = list(given_m)
     for height_m in taken_m.values():
-        left_m.remove(height_m)
+        if height_m in left_m:
+            left_m.remove(height_m)
     if left_m:
         heights = enumerated([f"{height_m:.2f} m" for height_m in left_m])
         said.append(f"Given, but not used, as nobody was taken to be so tall: {heights}.")
