@@ -13,7 +13,7 @@ use super::locate::{
 };
 use super::options::TrackerOptions;
 use super::options::start_height;
-use super::rate::lasting;
+use super::rate::{lasting, mean_interval_s};
 use super::start::{StartReport, StartSearch};
 use super::walk::{FrameEdges, Walk};
 use crate::calibrate::TiltEstimate;
@@ -141,9 +141,9 @@ impl Candidate {
         self.missed == 0 && self.seen.len() >= frames.max(self.least)
     }
 
-    /// Mean time from one of its frames to the next, seconds.
+    /// Mean time from one of its frames to the next, seconds; NaN of fewer than two.
     fn apart_s(&self) -> f64 {
-        lasts_s(&self.seen) / (self.seen.len().max(2) - 1) as f64
+        mean_interval_s(self.seen.iter().map(|seen| seen.edges.time_s))
     }
 
     /// Starts a walk, or says why not: things that do not move like a walker.
