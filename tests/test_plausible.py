@@ -77,8 +77,10 @@ def test_heights_in_another_order_and_heights_of_nobody_are_named(given_m, taken
 
 
 def test_a_height_of_nobody_is_named_by_the_track_of_everybody_alone(scene):
+    said = "Given, but not used, as nobody was taken to be so tall: 1.50 m."
     track = tracked(scene, height_m=[scene.height_m, 1.5])
-    assert track.sentences[0] == "Given, but not used, as nobody was taken to be so tall: 1.50 m."
+    assert track.sentences[0] == said
+    assert tracked(scene, height_m=np.array([scene.height_m, 1.5])).sentences[0] == said
     assert not any("nobody" in sentence for sentence in track.of_person(0).sentences)
 
 

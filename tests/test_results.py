@@ -1,6 +1,7 @@
 """What every result can do beside holding numbers: a short repr, pandas, plots, pickling; and long calls that
 can be watched and interrupted."""
 
+import copy
 import html
 import logging
 import pickle
@@ -307,5 +308,14 @@ def test_a_point_of_the_picture_chooses_a_person(track):
     assert track.person_at(*middle, 10_000) is None
     alone = track.of_person(0)
     assert len(alone) == len(track) and alone.summary == track.summary
-    with pytest.raises(ValueError, match=r"no person 1: the track has 1 person, counted from 0"):
+    with pytest.raises(ValueError, match=r"no person 1; people of the track: 0"):
         track.of_person(1)
+
+
+def test_a_person_alone_keeps_the_number(track):
+    two = copy.copy(track)
+    two.walks, two._people = track.walks * 2, {track.walks[0].person: 1}
+    alone = two.of_person(1).of_video(2)
+    assert alone.people == [1, 1] and set(alone.columns["person"]) == {1}
+    assert {event["person"] for event in alone.events} == {1}
+    assert any(sentence.startswith("Walk 1 (person 1)") for sentence in alone.sentences)

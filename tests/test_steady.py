@@ -84,6 +84,7 @@ def test_a_slow_zoom_is_reported():
         (["still"] * 19 + ["unknown"], False),
         (["still"] * 2 + ["unknown"] * 18, True),
         (["still", "turned"] * 5 + ["unknown"] * 10, True),
+        (["still"] * 19 + ["turned"], False),
     ],
 )
 def test_frames_that_no_turn_explains_are_reported(states, is_reported):
@@ -94,6 +95,8 @@ def test_frames_that_no_turn_explains_are_reported(states, is_reported):
     motion = CameraMotion(rows)
     said = [sentence for sentence in motion.sentences if "the camera did more than turn" in sentence]
     assert motion.is_unexplained == is_reported and len(said) == is_reported
+    turned = states.count("turned")
+    assert turned != 1 or "Of 20 frames, 1 was turned back." in motion.sentences[0]
 
 
 def test_a_hand_held_recording_is_steadied():

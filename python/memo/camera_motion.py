@@ -94,7 +94,7 @@ class CameraMotion:
             said.append(
                 f"The camera moved: the picture shifts by up to {summary['largest_px']:.1f} px "
                 f"({summary['rms_px']:.1f} px root mean square) against the first frame. "
-                f"{counted(steadied, 'frame')} of {len(self.rows)} were turned back."
+                f"Of {counted(len(self.rows), 'frame')}, {counted(steadied, 'was', 'were')} turned back."
             )
         if self.is_unexplained:
             said.append(

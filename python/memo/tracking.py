@@ -314,6 +314,7 @@ class Track:
         options: Mapping[str, Any] | None = None,
     ) -> None:
         self.walks: list[_memo.Walk] = list(walks)
+        self._people = {person: k for k, person in enumerate(sorted({walk.person for walk in walks}))}
         self.seek_report: _memo.SeekReport = seek_report
         self.shrink: int = shrink
         """Pixels of the video per pixel of a given frame, per axis: 1 unless set by `of_video`."""
@@ -333,17 +334,11 @@ class Track:
 
         It changes the columns in pixels, the contours and the camera.
         """
-        motion = replace(self.camera_motion, shrink=shrink)
-        return Track(
-            self.walks,
-            self.seek_report,
-            self._camera,
-            shrink=shrink,
-            video_size=size,
-            camera_motion=motion,
-            left_out=[left.of_video(shrink // self.shrink) for left in self.left_out],
-            options=self._options,
-        )
+        scaled = copy.copy(self)
+        scaled.shrink, scaled._video_size = shrink, size
+        scaled.camera_motion = replace(self.camera_motion, shrink=shrink)
+        scaled.left_out = [left.of_video(shrink // self.shrink) for left in self.left_out]
+        return scaled
 
     @property
     def columns(self) -> dict[str, npt.NDArray[Any]]:
@@ -362,8 +357,7 @@ class Track:
     @property
     def people(self) -> list[int]:
         """The person of each walk, counted from 0 in order of appearance."""
-        order = {person: k for k, person in enumerate(sorted({walk.person for walk in self.walks}))}
-        return [order[walk.person] for walk in self.walks]
+        return [self._people[walk.person] for walk in self.walks]
 
     def person_at(self, u_px: float, v_px: float, frame: int) -> int | None:
         """The person whose model covers a point of the picture in a frame; of several, the one whose middle
@@ -379,11 +373,11 @@ class Track:
         return min(found)[1] if found else None
 
     def of_person(self, person: int) -> Track:
-        """The walks of one person alone; people are counted from 0, as in the column `person`."""
+        """The walks of one person alone, who keeps the number of the column `person`."""
         walks = [walk for walk, own in zip(self.walks, self.people, strict=True) if own == person]
         if not walks:
-            there = counted(len(set(self.people)), "person", "people")
-            raise ValueError(f"there is no person {person}: the track has {there}, counted from 0")
+            there = ", ".join(map(str, sorted(set(self.people)))) or "nobody"
+            raise ValueError(f"there is no person {person}; people of the track: {there}")
         alone = copy.copy(self)
         alone.walks = walks
         alone._is_everybody = False
@@ -440,8 +434,8 @@ class Track:
                 chance = f"probability {walk.p_swapped:.0%}"
                 told.append(f"Left and right may be swapped ({chance}): check them before use.")
             if _is_in_place(walk) and has_usual_steps(walk):
-                told += [] if unseen else symmetry_sentences(self.gait_parameters, index)
                 is_sure = walk.p_swapped <= LIKELY_MISTAKEN and not is_heading_open(walk)
+                told += symmetry_sentences(self.gait_parameters, index) if is_sure and not unseen else []
                 told += departure_sentences(walk.departures) if is_sure else []
             whose = ""
             if len(self.walks) > 1:
@@ -453,9 +447,9 @@ class Track:
 
     def _height_sentences(self) -> list[str]:
         given = self._options.get("height_m")
-        if not (self.walks and self._is_everybody and isinstance(given, Sequence) and len(given) > 1):
+        if not (self.walks and self._is_everybody and np.size(given) > 1):
             return []
-        return given_height_sentences(given, zip(self.people, self.walks, strict=True))
+        return given_height_sentences(np.asarray(given).tolist(), zip(self.people, self.walks, strict=True))
 
     def _flicker_sentences(self) -> list[str]:
         seek = self.seek_report
@@ -463,7 +457,8 @@ class Track:
             return []
         return [
             f"The brightness of the picture changes by up to {seek.largest_flicker:.0%}: "
-            f"{counted(seek.frames_relit, 'frame')} of {seek.frames} were made as bright as the others."
+            f"of {counted(seek.frames, 'frame')}, {counted(seek.frames_relit, 'was', 'were')} made as bright "
+            "as the others."
         ]
 
     def _joined(self, index: int) -> list[str]:
