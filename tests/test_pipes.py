@@ -133,3 +133,23 @@ def test_commands_end_silently_with_their_results_written(folder, unbuffered):
 def test_complaints_nobody_reads_end_a_command_silently(folder):
     for command, closed, code, said in ended([["track", folder / "none.mp4"], ["batch"], ["nonsense"]]):
         assert (code, said) == (141, "") if closed == 2 else code in (1, 2) and bool(said), command
+
+
+@pytest.mark.parametrize(
+    ("output", "code", "said"),
+    [(">&-", 0, ""), (">/dev/full", 1, "memo: [Errno 28] No space left on device")],
+)
+def test_an_output_that_is_closed_or_full_is_no_traceback(output, code, said):
+    command = f"{sys.executable} -m memo.cli --version {output}"
+    done = subprocess.run(command, shell=True, capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stderr.strip()) == (code, said)
+
+
+def test_an_output_in_ascii_has_all_sentences():
+    code = "import sys; from memo.cli import main, delivery; sys.argv = ['memo', '--version']\ntry: main()\n"
+    code += "except SystemExit: print('29\\xb0 gr\\udcfc\\udcdf')"
+    environment = os.environ | {"PYTHONIOENCODING": "ascii"}
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, env=environment, timeout=60
+    )
+    assert done.stdout.endswith("29\\xb0 gr\\udcfc\\udcdf\n") and not done.stderr

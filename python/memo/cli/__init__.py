@@ -7,6 +7,7 @@ everything from the `app` extra is imported inside functions, after `main` has c
 """
 
 import contextlib
+import io
 import os
 import sys
 from importlib.util import find_spec
@@ -44,13 +45,20 @@ EXTRA = ("av", "matplotlib", "rich", "typer")
 
 def main() -> None:
     """Entry point of the `memo` command."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):  # None if it is closed
+            stream.reconfigure(errors="backslashreplace")  # degrees in ASCII, names that are no text
     try:
         try:
             _run()
         finally:
-            sys.stdout.flush()  # buffered output may meet a closed pipe, too
+            if sys.stdout is not None:
+                sys.stdout.flush()  # buffered output may meet a closed pipe, too
     except BrokenPipeError:
         _end_unread()
+    except OSError as error:  # a full disk behind the output
+        complain(str(error))
+        _end_unread(Exit.BAD_INPUT)
     except SystemExit as ended:  # click and rich raise SystemExit for a closed pipe
         if isinstance(ended.__context__, BrokenPipeError):
             _end_unread()
@@ -68,13 +76,13 @@ def _run() -> None:
         raise SystemExit(Exit.INTERRUPTED) from None
 
 
-def _end_unread() -> NoReturn:
-    """Ends silently, as usual for a program whose reader has ended, as in `memo ... | head`."""
+def _end_unread(exit_code: Exit = Exit.PIPE_CLOSED) -> NoReturn:
+    """Ends without further output, as usual for a program whose reader has ended, as in `memo ... | head`."""
     nowhere = os.open(os.devnull, os.O_WRONLY)
     for stream in (sys.stdout, sys.stderr):
-        with contextlib.suppress(OSError, ValueError):
+        with contextlib.suppress(OSError, ValueError, AttributeError):
             os.dup2(nowhere, stream.fileno())
-    raise SystemExit(Exit.PIPE_CLOSED)
+    raise SystemExit(exit_code)
 
 
 def _app() -> "typer.Typer":

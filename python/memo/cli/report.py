@@ -128,4 +128,9 @@ def _checked_file(path: Path) -> Path:
         raise InputError(f"{path}: is a folder; --out names the file to write")
     if not path.parent.is_dir():
         raise InputError(f"{path}: there is no folder {path.parent}")
+    if path.is_file():
+        with path.open("rb") as file:
+            is_page = file.read(15).lower() == b"<!doctype html>"
+        if not is_page:
+            raise InputError(f"{path}: exists and is no HTML page; give another name")
     return path

@@ -96,7 +96,8 @@ def write_comparison(
 
 
 def _written(page: Page, path: Path, kind: str, contents: dict[str, Any]) -> Report:
-    written = page.html().encode("utf-8")
+    # A file name that is no text is shown by its bytes.
+    written = page.html().encode("utf-8", "backslashreplace")
     with complete_file(path) as temporary:
         temporary.write_bytes(written)
     return Report(path, kind, len(written), contents)

@@ -105,17 +105,11 @@ def packed(points_px: npt.ArrayLike, shrink: int = 1) -> str:
 
 
 def colour_frames(path: str | PathLike[str]) -> Iterator[tuple[int, float, npt.NDArray[np.uint8]]]:
-    """Number, seconds since the first and (H, W, 3) RGB pixels of the frames of a video written by memo."""
+    """Number, time in seconds and (H, W, 3) RGB pixels of the frames of a video written by memo."""
     try:
         with av.open(str(Path(path).absolute())) as container:
-            first_s: float | None = None
             for index, frame in enumerate(container.decode(video=0)):
-                first_s = (frame.time or 0.0) if first_s is None else first_s
-                yield (
-                    index,
-                    (frame.time or 0.0) - first_s,
-                    np.asarray(frame.to_ndarray(format="rgb24"), np.uint8),
-                )
+                yield index, frame.time or 0.0, np.asarray(frame.to_ndarray(format="rgb24"), np.uint8)
     except (av.error.FFmpegError, IndexError) as error:
         raise ValueError(f"{path}: cannot be read as a video: {error}") from None
 

@@ -131,6 +131,8 @@ def _pictures(
         try:
             kept, every = _overlay_pictures(run, run.overlay, choice, progress)
             return kept, True, None, every
+        except _NoFrames:
+            raise
         except (ValueError, OSError) as error:
             notes.append(f"The overlay cannot be read ({_one_line(error)}).")
     notes.append("There are no pictures: neither the video nor overlay.mp4 can be read.")
@@ -180,6 +182,8 @@ def _overlay_pictures(
         if choice.takes(frame) and thinned.wants_next():
             picture = Picture(frame, float(times.get(frame, time_s)), jpeg_uri(rgb, LONGEST_PX))
             thinned.keep(picture, picture.size_bytes)
+    if not thinned.items and choice.chosen:
+        raise _NoFrames(f"{overlay}: no frame of the run is among those requested; {_read(run)}")
     return thinned.items, thinned.every
 
 
