@@ -41,8 +41,18 @@ def test_intervals_are_combined_and_decide():
     [nearly] = parameter_differences(
         parameters(step_length=(0.6, 0.0)), parameters(step_length=(0.66, 0.0598)), (0, 0)
     )
-    assert nearly.is_sure and difference_sentences(("A", "B"), [nearly], []) == [
-        "No difference between the two walks can be told."
+    assert nearly.value > nearly.half and not nearly.is_sure, "the interval reads 0.000 to 0.120"
+
+
+def test_of_a_symmetry_both_values_are_told():
+    def symmetry(percent, half):
+        row = ("step_time_symmetry", "", percent, "%", percent - half, percent + half, 3)
+        return gait_table([[_memo.GaitParameter(*row)]])
+
+    [one] = parameter_differences(symmetry(-8.0, 2.0), symmetry(-2.0, 2.0), (0, 0))
+    assert one.is_of_a_side
+    assert difference_sentences(("A", "B"), [one], []) == [
+        "Step time symmetry: -8.0 % in A and -2.0 % in B, a difference of 6.0 % (3.2 to 8.8)."
     ]
 
 

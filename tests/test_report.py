@@ -25,7 +25,7 @@ from memo.linkage import Points, write_figure_csv
 from memo.report import normative, write_comparison, write_report
 from memo.report.choice import ordinal
 from memo.report.page import number
-from memo.report.pictures import Thinned, jpeg_uri, mask_uri, packed
+from memo.report.pictures import Thinned, colour_frames, jpeg_uri, mask_uri, packed
 from PIL import Image
 
 HOSTILE = "<script>document.title='taken'</script>&\"'.mp4"
@@ -295,6 +295,31 @@ def test_sides_that_may_be_swapped_are_not_judged(two_folders):
     assert "not judged: left and right, or the heading, may be wrong" in written
 
 
+def test_parameters_of_a_side_are_not_judged_if_sides_may_be_swapped(two_folders):
+    first, second = two_folders
+    rows = (first / "gait_parameters.csv").read_text().splitlines()
+    for folder, (time_s, percent) in zip(two_folders, [(0.5, -20), (0.9, 20)], strict=True):
+        more = [f"0,step_time,right,{time_s},s,{time_s},{time_s},9"]
+        more += [f"0,step_time_symmetry,,{percent},%,{percent},{percent},9"]
+        (folder / "gait_parameters.csv").write_text("\n".join([*rows, *more]) + "\n")
+    for p_swapped, told in ((0.45, 0), (0.01, 2)):
+        for folder in two_folders:
+            table = read_track_csv(folder / "track.csv")
+            write_track_csv(folder / "track.csv", table | {"p_swapped": np.full(20, p_swapped)})
+        report = write_comparison(first, second)
+        said = [sentence for sentence in report.contents["sentences"] if sentence.startswith("Step time")]
+        assert len(said) == told, report.contents["sentences"]
+
+
+def test_folders_of_the_same_name_are_told_apart(two_folders, tmp_path):
+    moved = []
+    for folder, visit in zip(two_folders, ("before", "after"), strict=True):
+        moved.append(tmp_path / "visits" / visit / "walk")
+        shutil.copytree(folder, moved[-1])
+    report = write_comparison(*moved)
+    assert report.contents["compared"] == "A is before/walk, B is after/walk."
+
+
 def test_a_heading_that_may_be_mirrored_is_not_judged(two_folders):
     for folder in two_folders:
         table = read_track_csv(folder / "track.csv")
@@ -411,6 +436,33 @@ def test_without_the_video_the_overlay_is_shown(run_folder, write_video, luma_fr
     assert data["pictures"]["time_s"][0] == pytest.approx(7 / 25)
     picture = Image.open(io.BytesIO(base64.b64decode(data["pictures"]["uri"][0].split(",")[1])))
     assert picture.size == (128, 96) and picture.mode == "RGB"
+
+
+def test_frames_of_an_overlay_have_the_times_of_the_video(run_folder, write_video, luma_frames):
+    folder = run_folder(count=0)
+    overlay = write_video(
+        "run/overlay.mp4", luma_frames(count=5, size=(128, 96)), times_s=0.2 + np.arange(5) / 25
+    )
+    assert [time_s for _, time_s, _ in colour_frames(overlay)] == pytest.approx(0.2 + np.arange(5) / 25)
+    (folder.parent / "walk.mp4").unlink()
+    with pytest.raises(ValueError, match="no frame of the run is among those requested"):
+        write_report(folder, frames=(500, 600))
+
+
+def test_a_page_takes_the_place_of_no_other_file(run_folder, tmp_path, memo_command):
+    folder = run_folder()
+    for name in ("walk.mp4", "run/track.csv"):
+        before = (tmp_path / name).read_bytes()
+        code, _, complaint = memo_command("report", folder, "--out", tmp_path / name)
+        assert code == 1 and "exists and is no HTML page; give another name" in complaint
+        assert (tmp_path / name).read_bytes() == before
+    for _ in range(2):
+        assert memo_command("report", folder, "--out", tmp_path / "page.html")[0] == 0
+
+
+def test_a_file_name_that_is_no_text_is_shown_by_its_bytes(run_folder):
+    folder = run_folder(video="gr\udcfc\udcdfe.mp4")
+    assert "gr\\udcfc\\udcdfe.mp4" in write_report(folder).path.read_text(encoding="utf-8")
 
 
 def test_a_video_of_another_size_is_not_taken(run_folder, write_video, luma_frames):

@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from memo.cycles import mean_cycle
 from memo.files import ANGLES, SIDES
-from memo.gait import GAIT_COLUMNS
+from memo.gait import GAIT_COLUMNS, digits_of
 from memo.wording import shows_zero
 
 __all__ = [
@@ -62,8 +62,24 @@ class ParameterDifference:
 
     @property
     def is_sure(self) -> bool:
-        """Whether the interval excludes zero."""
-        return abs(self.value) > self.half
+        """Whether the interval excludes zero, also as it is printed."""
+        least = abs(self.value) - self.half
+        return least > 0 and not shows_zero(least, self.digits)
+
+    @property
+    def digits(self) -> int:
+        """Decimals that are printed."""
+        return digits_of(str(self.first["unit"]))
+
+    @property
+    def is_of_a_side(self) -> bool:
+        """Whether it is another one if left and right are exchanged."""
+        return str(self.first["side"]) != "" or self.is_symmetry
+
+    @property
+    def is_symmetry(self) -> bool:
+        """Whether its sign says which side has more."""
+        return str(self.first["parameter"]).endswith("_symmetry")
 
 
 @dataclass(frozen=True)
@@ -90,8 +106,12 @@ class CurveDifference:
 
     @property
     def is_sure(self) -> bool:
-        """Whether the walks differ in a joint that is judged, for long enough that it is not chance."""
-        return self.joint in JUDGED and self.sure_share >= LEAST_SHARE
+        """Whether the walks differ in a joint that is judged, by an interval that excludes zero also as it is
+        printed, for long enough that it is not chance."""
+        if self.joint not in JUDGED or self.sure_share < LEAST_SHARE:
+            return False
+        _, value, half = self.largest
+        return not shows_zero(abs(value) - half, 0)
 
     @property
     def largest(self) -> tuple[int, float, float]:
@@ -138,25 +158,23 @@ def curve_differences(first: Table, second: Table, walks: tuple[int, int]) -> li
 def difference_sentences(
     names: tuple[str, str], parameters: Iterable[ParameterDifference], curves: Iterable[CurveDifference]
 ) -> list[str]:
-    """Reports only differences whose interval excludes zero, also as it is printed; one sentence if there are
-    none."""
+    """Reports only differences that are sure; one sentence if there are none."""
     said = []
     for one in (one for one in parameters if one.is_sure):
-        row, size = one.first, abs(one.value)
-        digits = 1 if row["unit"] in ("%", "1/min", "deg") else 3
-        if shows_zero(size - one.half, digits):
-            continue
+        row, size, digits = one.first, abs(one.value), one.digits
         unit = {"deg": "°", "": "", "1/min": " per minute"}.get(str(row["unit"]), f" {row['unit']}")
         side = f", {row['side']}" if row["side"] else ""
-        said.append(
-            f"{str(row['parameter']).replace('_', ' ').capitalize()}{side}: {size:.{digits}f}{unit} "
-            f"({size - one.half:.{digits}f} to {size + one.half:.{digits}f}) "
-            f"{'larger' if one.value > 0 else 'smaller'} in {names[1]} than in {names[0]}."
-        )
+        name = f"{str(row['parameter']).replace('_', ' ').capitalize()}{side}"
+        by = f"{size:.{digits}f}{unit} ({size - one.half:.{digits}f} to {size + one.half:.{digits}f})"
+        if one.is_symmetry:
+            values = zip((row["value"], one.second["value"]), names, strict=True)
+            each = " and ".join(f"{value:+.{digits}f}{unit} in {name}" for value, name in values)
+            said.append(f"{name}: {each}, a difference of {by}.")
+        else:
+            larger = "larger" if one.value > 0 else "smaller"
+            said.append(f"{name}: {by} {larger} in {names[1]} than in {names[0]}.")
     for curve in (curve for curve in curves if curve.is_sure):
         percent, value, half = curve.largest
-        if shows_zero(abs(value) - half, 0):
-            continue
         said.append(
             f"The {curve.side} {curve.joint} is {abs(value):.0f}° ({abs(value) - half:.0f} to "
             f"{abs(value) + half:.0f}) {'more' if value > 0 else 'less'} flexed in {names[1]} than in "

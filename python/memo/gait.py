@@ -26,6 +26,7 @@ __all__ = [
     "DEFINITIONS",
     "GAIT_COLUMNS",
     "cadence_sentences",
+    "digits_of",
     "gait_table",
     "read_gait_parameters_csv",
     "symmetry_sentences",
@@ -112,6 +113,11 @@ def lookup(
 
 
 _STEADY = 0.2
+
+
+def digits_of(unit: str) -> int:
+    """Digits after the point of a gait parameter in this unit."""
+    return 1 if unit in ("%", "1/min", "deg") else 3
 
 
 def cadence_sentences(table: Mapping[str, npt.NDArray[Any]], walk: int) -> list[str]:

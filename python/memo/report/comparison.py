@@ -21,12 +21,13 @@ from memo.report import normative
 from memo.report.cycles import drawn_cycles
 from memo.report.page import Page, number, rows_table, text
 from memo.report.run_folder import RunFolder, read_run_folder
-from memo.report.track_text import digits_of, measured
+from memo.report.track_text import measured
 from memo.wording import counted
 
 __all__ = ["comparison_page"]
 
 _NO_DIFFERENCE = "no difference can be told"
+_UNSURE_SIDES = "not judged: left and right, or the heading, may be wrong"
 
 
 def comparison_page(
@@ -47,25 +48,27 @@ def comparison_page(
         max(_p_swapped(run, walk), run.p_other_heading(walk)) <= LIKELY_MISTAKEN
         for run, walk in zip(runs, chosen, strict=True)
     )
-    sentences = difference_sentences(("A", "B"), parameters, curves if are_sides_sure else [])
-    notes = [note for run, walk in zip(runs, chosen, strict=True) for note in _doubts(run, walk)]
+    told = [one for one in parameters if are_sides_sure or not one.is_of_a_side]
+    sentences = difference_sentences(("A", "B"), told, curves if are_sides_sure else [])
+    names = _names(runs, chosen)
+    each = zip(names, runs, chosen, strict=True)
+    notes = [note for name, run, walk in each for note in _doubts(name, run, walk)]
     page = Page(
-        title=f"memo: {_name(runs[0], chosen[0])} and {_name(runs[1], chosen[1])}",
+        title=f"memo: {names[0]} and {names[1]}",
         layout="comparison",
         scripts=("base.js", "cycles.js"),
         filled={
             "version": text(memo.__version__),
-            "first": text(_name(runs[0], chosen[0])),
-            "second": text(_name(runs[1], chosen[1])),
+            "first": text(names[0]),
+            "second": text(names[1]),
             "sentences": "".join(f"<p>{text(said)}</p>" for said in sentences),
             "warnings": "".join(f"<li>{text(note)}</li>" for note in notes),
-            "parameters": _parameter_table(parameters),
+            "parameters": _parameter_table(parameters, are_sides_sure),
             "curves": _curve_table(curves, are_sides_sure),
             "band_source": text(normative.SOURCE),
         },
         data={"cycles": _cycles(runs, chosen)},
     )
-    names = [_name(run, walk) for run, walk in zip(runs, chosen, strict=True)]
     compared = f"A is {names[0]}, B is {names[1]}."
     return page, {"walks": list(chosen), "compared": compared, "sentences": sentences, "notes": notes}
 
@@ -86,34 +89,37 @@ def _walk(run: RunFolder, wanted: int | None) -> int:
     return wanted
 
 
-def _name(run: RunFolder, walk: int) -> str:
-    """The folder, and the walk if there are several."""
-    several = len(np.unique(run.columns["walk"])) > 1
-    return run.path.resolve().name + (f", walk {walk}" if several else "")
+def _names(runs: tuple[RunFolder, RunFolder], walks: tuple[int, int]) -> list[str]:
+    """The folders, with as much of their paths as tells them apart, and the walk of one with several."""
+    paths = [run.path.resolve() for run in runs]
+    most = max(len(path.parts) for path in paths) if paths[0] != paths[1] else 1
+    tails = ([Path(*path.parts[-count:]) for path in paths] for count in range(1, most + 1))
+    names = next(pair for pair in tails if pair[0] != pair[1] or most == 1)
+    several = [len(np.unique(run.columns["walk"])) > 1 for run in runs]
+    each = zip(names, walks, several, strict=True)
+    return [f"{name}, walk {walk}" if is_one else str(name) for name, walk, is_one in each]
 
 
 def _p_swapped(run: RunFolder, walk: int) -> float:
     return float(run.columns["p_swapped"][run.columns["walk"] == walk][0])
 
 
-def _doubts(run: RunFolder, walk: int) -> list[str]:
+def _doubts(name: str, run: RunFolder, walk: int) -> list[str]:
     p_swapped = _p_swapped(run, walk)
     told = []
     rows = (run.parameters["walk"] == walk) & (run.parameters["parameter"] == "speed")
     if (run.parameters["value"][rows] < 0).any():
-        told.append(f"{_name(run, walk)}: the person walks backwards.")
+        told.append(f"{name}: the person walks backwards.")
     verdict = run.verdict(walk)
     if verdict not in (None, "well", "not measured"):
-        told.append(f"{_name(run, walk)}: the model fits the person {verdict}; check its overlay before use.")
+        told.append(f"{name}: the model fits the person {verdict}; check its overlay before use.")
     if p_swapped > LIKELY_MISTAKEN:
-        told.append(f"{_name(run, walk)}: left and right may be swapped (probability {p_swapped:.0%}).")
+        told.append(f"{name}: left and right may be swapped (probability {p_swapped:.0%}).")
     if run.p_other_heading(walk) > LIKELY_MISTAKEN:
         chance = f"probability {run.p_other_heading(walk):.0%}"
-        told.append(
-            f"{_name(run, walk)}: on the treadmill, the mirrored heading may be the true one ({chance})."
-        )
+        told.append(f"{name}: on the treadmill, the mirrored heading may be the true one ({chance}).")
     if not (run.cycles["walk"] == walk).any():
-        told.append(f"{_name(run, walk)}: it has no measured gait cycles.")
+        told.append(f"{name}: it has no measured gait cycles.")
     return told
 
 
@@ -129,9 +135,9 @@ def _cycles(runs: tuple[RunFolder, RunFolder], walks: tuple[int, int]) -> dict[s
     return {"curves": curves, "band": normative.band()}
 
 
-def _parameter_table(parameters: list[ParameterDifference]) -> str:
+def _parameter_table(parameters: list[ParameterDifference], are_sides_sure: bool) -> str:
     rows = [
-        (_parameter(one.first), measured(one.first), measured(one.second), _difference(one))
+        (_parameter(one.first), measured(one.first), measured(one.second), _difference(one, are_sides_sure))
         for one in parameters
         if np.isfinite(one.first["value"]) or np.isfinite(one.second["value"])
     ]
@@ -145,11 +151,13 @@ def _parameter(row: Any) -> str:
     return text(str(row["parameter"]).replace("_", " ") + side + unit)
 
 
-def _difference(one: ParameterDifference) -> str:
+def _difference(one: ParameterDifference, are_sides_sure: bool) -> str:
     """The difference with its interval, and whether it can be told, as HTML."""
     if not np.isfinite(one.value):
         return number(one.value)
-    digits = digits_of(one.first["unit"])
+    if one.is_of_a_side and not are_sides_sure:
+        return _UNSURE_SIDES
+    digits = one.digits
     interval = f"{number(one.value - one.half, digits)} to {number(one.value + one.half, digits)}"
     told = "" if one.is_sure else f"; {_NO_DIFFERENCE}"
     return f'{number(one.value, digits)} <small class="interval">{interval}{told}</small>'
@@ -166,7 +174,7 @@ def _curve_table(curves: list[CurveDifference], are_sides_sure: bool) -> str:
 
 def _largest(curve: CurveDifference, are_sides_sure: bool) -> str:
     if not are_sides_sure:
-        return "not judged: left and right, or the heading, may be wrong"
+        return _UNSURE_SIDES
     if curve.joint not in JUDGED:
         return "not judged: its errors are larger than stated"
     if not curve.is_sure:

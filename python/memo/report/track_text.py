@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 import memo
-from memo.gait import DEFINITIONS, GAIT_COLUMNS, cadence_sentences
+from memo.gait import DEFINITIONS, GAIT_COLUMNS, cadence_sentences, digits_of
 from memo.plausible import LIKELY_MISTAKEN
 from memo.report import normative
 from memo.report.cycles import none_sentence
@@ -17,7 +17,7 @@ from memo.report.pictures import Picture
 from memo.report.run_folder import RunFolder
 from memo.wording import counted
 
-__all__ = ["digits_of", "measured", "track_text"]
+__all__ = ["measured", "track_text"]
 
 _DEEPEST = 4
 _MOST_SENTENCES = 8
@@ -276,7 +276,7 @@ def _fit_of_walk(run: RunFolder, walk: int) -> str:
     parts = fit.get("parts")
     if not parts:  # of an older version
         return f"<p>{caption}.</p>"
-    off = set(fit["off_parts"])
+    off = set(fit.get("off_parts", ()))
     rows = [
         (
             f"<b>{text(part)}</b>" if part in off else text(part),
@@ -290,11 +290,6 @@ def _fit_of_walk(run: RunFolder, walk: int) -> str:
 
 def _off_and_missed(of: Mapping[str, Any], *keys: str) -> list[str]:
     return [UNKNOWN if of[key] is None else number(of[key], 1) for key in keys]
-
-
-def digits_of(unit: str) -> int:
-    """Digits after the point of a gait parameter in this unit."""
-    return 1 if unit in ("%", "1/min", "deg") else 3
 
 
 def measured(line: Mapping[str, Any]) -> str:
