@@ -1,5 +1,6 @@
 """The command line as a user meets it: exit codes, what is said, what is left behind."""
 
+import dataclasses
 import json
 import os
 import shlex
@@ -17,7 +18,7 @@ import numpy as np
 import pytest
 import typer
 from conftest import shared_video
-from memo import cli
+from memo import cli, recording
 from memo.cli.demo import from_truth, strikes_from_truth
 from memo.files import (
     TRACK_COLUMNS,
@@ -364,6 +365,61 @@ def test_interrupt_writes_what_was_tracked(write_video, luma_frames, tmp_path):
     assert code == 130 and complaint.count("\n") == 1 and "interrupted" in complaint
     assert 1 <= len(read_track_csv(tmp_path / "out" / "track.csv")["frame"]) < 400
     assert read_run(tmp_path / "out")["interrupted"] is True
+
+
+def test_an_interrupt_before_anybody_was_tracked_leaves_earlier_results(
+    memo_command, write_video, luma_frames, tmp_path, monkeypatch
+):
+    video, out = write_video("walk.mp4", luma_frames()), tmp_path / "out"
+    assert memo_command("track", video, "--out", out)[0] == 0
+    earlier = {path.name: path.read_bytes() for path in out.iterdir()}
+
+    def stopped(*_):
+        recorded = real(*_)
+        recorded.columns = {name: values[:0] for name, values in recorded.columns.items()}
+        return dataclasses.replace(recorded, run=(*recorded.run[:3], True))
+
+    real = recording.follow
+    monkeypatch.setattr(recording, "follow", stopped)
+    code, said, complaint = memo_command("track", video, "--out", out)
+    assert (code, said) == (130, "") and "holds the results of an earlier run" in complaint
+    assert {path.name: path.read_bytes() for path in out.iterdir()} == earlier
+
+
+@pytest.mark.parametrize(("error", "code"), [(KeyboardInterrupt(), 130), (OSError(28, "No space left"), 1)])
+def test_what_was_found_is_told_though_it_cannot_be_drawn(
+    memo_command, write_video, luma_frames, tmp_path, monkeypatch, error, code
+):
+    def broken(*_, **__):
+        raise error
+
+    video = write_video("walk.mp4", luma_frames())
+    _, told, _ = memo_command("track", video, "--out", tmp_path / "whole", "--no-plots", "--json")
+    monkeypatch.setattr(recording, "draw_overlay", broken)
+    found, said, _ = memo_command("track", video, "--out", tmp_path / "out", "--no-plots", "--json")
+    assert found == code
+    assert (
+        json.loads(said)["sentences"] == json.loads(told)["sentences"]
+        and (tmp_path / "out" / "run.json").exists()
+    )
+
+
+def test_tables_need_no_second_look_at_the_video(
+    memo_command, write_video, luma_frames, tmp_path, monkeypatch
+):
+    video, out = write_video("walk.mp4", luma_frames()), tmp_path / "out"
+    real = recording.follow
+
+    def then_gone(*arguments):
+        recorded = real(*arguments)
+        video.unlink()
+        return recorded
+
+    monkeypatch.setattr(recording, "follow", then_gone)
+    code, _, complaint = memo_command("track", video, "--out", out)
+    assert code == 1 and "walk.mp4: no such file" in complaint and (out / "track.csv").exists()
+    write_video("walk.mp4", luma_frames())
+    assert memo_command("track", video, "--out", tmp_path / "other", "--no-overlay")[0] == 0
 
 
 @pytest.mark.parametrize("absent", ["typer", "av", "matplotlib", "rich"])

@@ -47,3 +47,27 @@ def test_a_disk_that_becomes_full_leaves_whole_files_alone(tmp_path, command, mo
         assert 0 < path.stat().st_size <= most_bytes
         if path.suffix == ".csv":
             assert path.read_text().endswith("\n")
+
+
+def test_earlier_tables_stay_together_if_new_ones_do_not_fit(
+    write_video, luma_frames, tmp_path, monkeypatch, core
+):
+    """Not some of this run beside others of that."""
+    out, video = tmp_path / "out", write_video("walk.mp4", luma_frames())
+    memo_track = ["track", str(video), "--out", str(out), "--no-overlay", "--no-plots"]
+
+    def run(height):
+        monkeypatch.setattr(sys, "argv", ["memo", *memo_track, "--height", height])
+        with pytest.raises(SystemExit) as stopped:
+            cli.main()
+        return stopped.value.code or 0
+
+    assert run("1.60") == 0
+    earlier = {path.name: path.read_bytes() for path in out.iterdir()}
+
+    def full(path, *_):
+        raise OSError(28, "No space left on device", str(path))
+
+    monkeypatch.setattr("memo.recording.write_cycles_csv", full)
+    assert run("1.86") == 1
+    assert {path.name: path.read_bytes() for path in out.iterdir()} == earlier

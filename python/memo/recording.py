@@ -7,6 +7,7 @@ averaged down. Needs `av`, and matplotlib for plots.
 
 from __future__ import annotations
 
+import shutil
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, nullcontext
@@ -29,6 +30,7 @@ from memo.given import InputError, check_apart, check_writable, nothing_at
 from memo.left_out import LeftOut
 from memo.run import NAME as RUN
 from memo.run import Source, write_run
+from memo.unfinished import new_folder
 
 if TYPE_CHECKING:
     from memo.tracking import Track
@@ -39,9 +41,10 @@ __all__ = [
     "Recorded",
     "Recording",
     "Stop",
+    "draw_overlay",
+    "draw_plots",
     "follow",
     "track_recording",
-    "write_results",
     "write_tables",
 ]
 
@@ -168,18 +171,19 @@ def track_recording(
     progress: Progress = _unseen,
     remark: Callable[[str], object] = lambda sentence: None,
     stop: Stop | None = None,
+    tracked: Callable[[Recorded], object] = lambda recorded: None,
 ) -> Recorded:
     """Tracks a video and writes the results into the folder `out`.
 
     Refuses a folder where they would replace the video, the boxes or the camera file, or lie among the images
     of the video. If stopped after a frame, it writes the tables of what was tracked until then, and draws
-    nothing.
+    nothing. `tracked` is called when the tables are written, before anything is drawn.
     """
     from memo.video import VideoDamageWarning
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", VideoDamageWarning)  # damage becomes a remark
-        return _track_recording(recording, out, progress, remark, stop)
+        return _track_recording(recording, out, progress, remark, stop, tracked)
 
 
 def _track_recording(
@@ -188,6 +192,7 @@ def _track_recording(
     progress: Progress,
     remark: Callable[[str], object],
     stop: Stop | None,
+    tracked: Callable[[Recorded], object],
 ) -> Recorded:
     from memo.video import VideoReader
 
@@ -223,19 +228,15 @@ def _track_recording(
             remark(f"{video}: {recorded.not_there}")
         if reader.damage:
             remark(f"{video}: {reader.damage}")
+    write_tables(recorded, out)
+    tracked(recorded)
     if recorded.interrupted:
-        write_tables(recorded, out)
         return recorded
-    with opened() as reader:
-        write_results(
-            recorded,
-            out,
-            reader,
-            reader.frame_count,
-            overlay=recording.overlay,
-            plots=recording.plots,
-            progress=progress,
-        )
+    if recording.overlay and len(recorded.columns["frame"]):
+        with opened() as reader:
+            draw_overlay(recorded, out, reader, reader.frame_count, progress=progress)
+    if recording.plots:
+        draw_plots(recorded, out)
     if recording.page:
         from memo.report import write_report
 
@@ -276,28 +277,26 @@ def follow(
     return _recorded(tracker, source, frames_read, asked.requested, point)
 
 
-def write_results(
+def draw_overlay(
     recorded: Recorded,
     out: Path,
     frames: Iterable[Frame],
     count: int | None = None,
     *,
-    overlay: bool = True,
-    plots: bool = True,
     progress: Progress = _unseen,
 ) -> None:
-    """Writes the tables and, if anybody was tracked, the pictures; the frames are those tracked."""
-    write_tables(recorded, out)
-    if not len(recorded.columns["frame"]):
-        return
-    if overlay:
-        from memo.overlay import write_overlay
+    """Writes `overlay.mp4` of the frames that were tracked."""
+    from memo.overlay import write_overlay
 
-        path, source = out / "overlay.mp4", recorded.source
-        drawn_on = _told(frames, "drawing", count, progress)
-        write_overlay(path, drawn_on, recorded, rate_hz=source.rate_hz, shrink=source.shrink)
-        recorded.written.append(path)
-    if plots:
+    path, source = out / "overlay.mp4", recorded.source
+    drawn_on = _told(frames, "drawing", count, progress)
+    write_overlay(path, drawn_on, recorded, rate_hz=source.rate_hz, shrink=source.shrink)
+    recorded.written.append(path)
+
+
+def draw_plots(recorded: Recorded, out: Path) -> None:
+    """Writes the plots, if anybody was tracked."""
+    if len(recorded.columns["frame"]):
         from memo.plot import write_plots
 
         recorded.written += write_plots(recorded, out)
@@ -438,15 +437,26 @@ def _not_there(track: Track, point: Point, first_frame: int, frames_read: int) -
 
 
 def write_tables(recorded: Recorded, out: Path) -> None:
-    """Writes the tables and run.json; removes pictures and the camera's motion of an earlier run."""
-    for stale in _DRAWN:  # from an earlier run: they do not match the new tables
-        (out / stale).unlink(missing_ok=True)
-    table, events, gait, cycles = (out / name for name in _TABLES)
-    write_track_csv(table, recorded.columns)
-    write_events_csv(events, recorded.events)
-    write_gait_parameters_csv(gait, recorded.gait_parameters)
-    write_cycles_csv(cycles, recorded.cycles)
-    recorded.written = [table, events, gait, cycles, write_run(out, recorded, *recorded.run)]
-    if recorded.camera_motion.moved or recorded.camera_motion.is_unexplained:
-        recorded.written.append(out / "camera_motion.csv")
-        write_camera_motion_csv(recorded.written[-1], recorded.camera_motion)
+    """Writes the tables and run.json; removes pictures and the camera's motion of an earlier run.
+
+    They take the place of earlier ones together, when all of them are complete. A run that was stopped before
+    anybody was tracked does not take the place of one in which somebody was.
+    """
+    if recorded.interrupted and not len(recorded.columns["frame"]) and (out / RUN).exists():
+        return
+    new = new_folder(out)
+    try:
+        table, events, gait, cycles = (new / name for name in _TABLES)
+        write_track_csv(table, recorded.columns)
+        write_events_csv(events, recorded.events)
+        write_gait_parameters_csv(gait, recorded.gait_parameters)
+        write_cycles_csv(cycles, recorded.cycles)
+        written = [table, events, gait, cycles, write_run(new, recorded, *recorded.run)]
+        if recorded.camera_motion.moved or recorded.camera_motion.is_unexplained:
+            written.append(new / "camera_motion.csv")
+            write_camera_motion_csv(written[-1], recorded.camera_motion)
+        for stale in _DRAWN:  # from an earlier run: they do not match the new tables
+            (out / stale).unlink(missing_ok=True)
+        recorded.written = [path.replace(out / path.name) for path in written]
+    finally:
+        shutil.rmtree(new, ignore_errors=True)

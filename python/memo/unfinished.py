@@ -53,6 +53,11 @@ def complete_file(path: str | PathLike[str], *, within: str | PathLike[str] | No
     try:
         yield temporary
         os.replace(temporary, path)
+    except OSError as error:
+        temporary.unlink(missing_ok=True)
+        if error.filename is not None and Path(error.filename) == temporary:
+            raise type(error)(error.errno, error.strerror, str(path)) from None
+        raise
     except BaseException:
         temporary.unlink(missing_ok=True)
         raise

@@ -16,7 +16,7 @@ from memo.cli.track import deliver_interrupted, report
 from memo.exits import Exit
 from memo.files import JOINTS
 from memo.given import check_writable
-from memo.recording import Recorded, follow, write_results, write_tables
+from memo.recording import Recorded, draw_overlay, draw_plots, follow, write_tables
 from memo.run import Source
 from memo.wording import counted
 
@@ -62,10 +62,10 @@ def _demo(delivery: Delivery, seed: int) -> Exit:
     source = Source(None, (0, None), rate_hz, camera_given=True)
     with with_steps(delivery) as progress:
         recorded = follow(frames, tracker, source, delivery.out, len(frames), progress, Interrupt())
-        if recorded.interrupted:
-            write_tables(recorded, delivery.out)
-        else:
-            write_results(recorded, delivery.out, frames, len(frames), progress=progress)
+        write_tables(recorded, delivery.out)
+        if not recorded.interrupted:
+            draw_overlay(recorded, delivery.out, frames, len(frames), progress=progress)
+            draw_plots(recorded, delivery.out)
     if recorded.interrupted:
         return deliver_interrupted(recorded, delivery)
     differences = from_truth(recorded.columns, scene.truth) | strikes_from_truth(recorded, scene.events)

@@ -125,10 +125,21 @@ def add_track(app: "typer.Typer") -> None:
 
 
 def _track(recording: Recording, delivery: Delivery) -> Exit:
-    with with_steps(delivery) as progress:
-        recorded = track_recording(
-            recording, delivery.out, progress=progress, remark=complain, stop=Interrupt()
-        )
+    tracked: list[Recorded] = []
+    try:
+        with with_steps(delivery) as progress:
+            recorded = track_recording(
+                recording,
+                delivery.out,
+                progress=progress,
+                remark=complain,
+                stop=Interrupt(),
+                tracked=tracked.append,
+            )
+    except (ValueError, OSError, KeyboardInterrupt):
+        for found in tracked:  # what was found is known, though not drawn
+            report(found, delivery)
+        raise
     if recorded.interrupted:
         return deliver_interrupted(recorded, delivery)
     report(recorded, delivery)
@@ -153,6 +164,11 @@ def report(recorded: Recorded, delivery: Delivery, more: Mapping[str, Any] | Non
 
 
 def deliver_interrupted(recorded: Recorded, delivery: Delivery) -> Exit:
+    if not recorded.written:
+        complain(
+            f"interrupted before anybody was tracked; {delivery.out} holds the results of an earlier run"
+        )
+        return Exit.INTERRUPTED
     report(recorded, delivery)
     complain("interrupted: the tables hold what was tracked until then; no overlay, no plots")
     return Exit.INTERRUPTED
