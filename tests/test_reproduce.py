@@ -3,7 +3,9 @@
 import csv
 import json
 import sys
+from functools import partial
 
+import memo
 import numpy as np
 import pytest
 from conftest import shared_video
@@ -14,7 +16,7 @@ from memo.reproduce import EXPERIMENTS, Clip, NobodyTracked, Verdict, hoffman_fl
 from memo.reproduce.lee_chen import plot_posture, plot_superposition
 from memo.reproduce.result import Row, cannot, compared
 from memo.reproduce.rohr_figures import similarity_peaks
-from memo.reproduce.sequence import scene_sequence
+from memo.reproduce.sequence import clip_sequence, scene_sequence
 
 # Lee and Chen, Tables 3 and 4, last row: left ankle, frames 1, 3, 5, then with rules 1 and 2.
 PRINTED_LEAVES = {"SEQ1": ([192, 96, 80], [32, 20, 28]), "SEQ2": ([44, 32, 8], [6, 5, 4])}
@@ -306,6 +308,23 @@ def test_a_clip_takes_the_place_of_the_real_sequences():
     assert "ido_walk.avi" in row_of(made, "Grey-value image").why
     assert "synthetic scene" in row_of(made, "Estimated models, synthetic sequence").why
     assert not any("give a video" in row.why for row in made.rows)
+
+
+@pytest.mark.usefixtures("scene")
+def test_the_model_of_the_figures_is_where_the_contours_are():
+    folder = shared_video("mocap_a")
+    clip = Clip(folder / "video.mp4", 1.86, memo.Camera.from_toml(folder / "camera.toml"))
+    assert rohr(clip).figures
+    sequence = clip_sequence(clip, lambda *_: None)
+    for row in (3, len(sequence.walk) // 2):
+        [lines, contours] = (
+            of(row)[0] for of in (partial(_memo.walk_lines, sequence.walk), sequence.walk.contours)
+        )
+        # A few lines are drawn in one of them alone.
+        np.testing.assert_allclose(lines.mean(axis=(0, 1)), contours.mean(axis=(0, 1)), atol=8.0)
+    fitted = memo.track(memo.demo_scene(0).frames, height_m=1.75, fps=25).walks[0]
+    with pytest.raises(ValueError, match="adapt=False"):
+        _memo.walk_lines(fitted, 0)
 
 
 def test_a_clip_without_a_walker_is_told(write_video, luma_frames):

@@ -380,6 +380,9 @@ def _draw_comparison(figure: Figure, sequence: Sequence, look: Look) -> None:
     lines, _ = _memo.walk_lines(sequence.walk, look.row)
     edges = np.ascontiguousarray(look.stages.edges[:, :4].reshape(-1, 2, 2))
     _, matches = _memo.similarity(lines, edges)
+    if not len(matches):
+        figure.text(0.5, 0.5, "no edge near the contours", ha="center")
+        return
     lengths = np.linalg.norm(lines[:, 1] - lines[:, 0], axis=1)
     telling = (np.degrees(matches[:, 4]) > 1.5) & (matches[:, 3] > 1)
     among = matches[telling] if telling.any() else matches

@@ -118,7 +118,8 @@ def clip_sequence(clip: Clip, progress: Progress) -> Sequence:
 
     with VideoReader(clip.video, rate_hz=clip.fps, shrink=None) as reader:
         count, shrink = reader.frame_count, reader.shrink
-    tracker = Tracker(clip.height_m, clip.camera and clip.camera.shrunk(shrink))
+    # As in the paper, the walker of the figures is the average one.
+    tracker = Tracker(clip.height_m, clip.camera and clip.camera.shrunk(shrink), adapt=False)
     return _sequence(Path(clip.video).name, clip.height_m, frames, count, tracker, None, progress)
 
 

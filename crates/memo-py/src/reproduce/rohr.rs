@@ -284,7 +284,10 @@ fn values(axis: &Axis, from: f64) -> Vec<f64> {
 }
 
 fn hypothesis(walk: &Walk, row: usize) -> PyResult<Hypothesis> {
-    let (_, rows) = walk.tracked()?;
+    let (tracked, rows) = walk.tracked()?;
+    if tracked.fitted().is_some() {
+        return Err(PyValueError::new_err("the person was fitted: give a walk of Tracker(adapt=False)"));
+    }
     rows.get(row).map(|row| row.hypothesis).ok_or_else(|| {
         PyIndexError::new_err(format!("row {row} of a walk with {}", counted(rows.len(), "row")))
     })
