@@ -7,6 +7,7 @@ from functools import partial
 import memo
 import numpy as np
 import pytest
+from memo import _memo
 from memo.files import FLIP_COLUMNS
 from memo.keypoints import KeypointsError, read_keypoints, write_csv
 
@@ -198,3 +199,22 @@ def test_a_file_is_read_as_for_posture_and_mistakes_are_told(tmp_path):
             memo.unswap(read, **options)
     with pytest.raises(memo.KeypointsError, match="frame rate must be positive"):
         memo.read_keypoints(tmp_path / "points.csv", fps="25")
+
+
+def test_a_level_is_exchanged_with_others_only_if_its_own_labels_are_rather_wrong():
+    """Ankles alone are exchanged; hips and knees, which coincide within the noise, say little."""
+    times_s = np.arange(76) / 25
+    surely = 0
+    for seed in range(6):
+        points = walk(76) + np.random.default_rng(seed).normal(0, 3, (76, 8, 2))
+        points[10:16, 4:] = points[10:16, [5, 4, 7, 6]]
+        repair = memo.unswap(memo.Keypoints.from_arrays(points, names=NAMES, times_s=times_s))
+        found = _memo.unswap(times_s, points, groups={"legs": LEVELS})["legs"]
+        decided = found.level_flipped & found.decided[:, None]
+        assert (found.level_p_flipped[decided] >= 0.5).all()
+        for row in repair.flips:
+            assert row["verdict"] != "flipped" or row["probability"] >= 0.9, row
+        frames = {row["frame"] for row in repair.flips if row["verdict"] == "flipped"}
+        assert repair.exchanged["legs"] == len(frames)
+        surely += len(frames & set(range(10, 16)))
+    assert surely >= 30, "of 36"

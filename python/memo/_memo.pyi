@@ -991,6 +991,7 @@ class LimbSides:
     p_flipped: Final[npt.NDArray[np.float64]]
     reason: Final[list[str]]
     level_flipped: Final[npt.NDArray[np.bool_]]
+    level_decided: Final[npt.NDArray[np.bool_]]
     level_p_flipped: Final[npt.NDArray[np.float64]]
     p_global: Final[float]
 

@@ -40,12 +40,13 @@ class SideRepair(Shown):
     keypoints: Keypoints
     """As read, with entries of right and left exchanged where they had been confused."""
     flips: list[dict[str, Any]]
-    """Rows of `flips.csv`: one for every frame in which a group was exchanged, one for every run of frames in
-    which it is undecided; `probability` is the probability that the labels were exchanged in the input."""
+    """Rows of `flips.csv`: for every frame in which levels of a group were exchanged, one of those that
+    surely were (`flipped`) and one of the others (`guessed`); one for every run of frames in which the group
+    is undecided. `probability` is that the labels were exchanged in the input, the least of the levels."""
     exchanged: dict[str, int]
-    """Number of frames exchanged with certainty, by group."""
+    """Number of frames in which levels were exchanged with certainty, by group."""
     guessed: dict[str, int]
-    """Number of frames exchanged only by the best guess, by group."""
+    """Number of frames in which levels were exchanged only by the best guess, by group."""
     undecided: dict[str, int]
     """Number of frames in which the labels are only the best guess, exchanged or not, by group. Frames in
     which no joint of the group is seen are not counted here or elsewhere."""
@@ -110,13 +111,14 @@ def unswap(
                 scores[rows, [left, right]] = scores[rows, [right, left]]
     seen = {group: _seen(keypoints, levels) for group, levels in pairs.items()}
     exchanged = {group: found[group].level_flipped.any(axis=1) & seen[group] for group in pairs}
+    surely = {group: _surely(found[group]).any(axis=1) & seen[group] for group in pairs}
     decided = {group: found[group].decided for group in pairs}
     flips = [row for group in pairs for row in _rows(keypoints, group, found[group], seen[group])]
     return SideRepair(
         keypoints=keypoints.replaced(points, scores),
         flips=sorted(flips, key=lambda row: (row["frame"], row["group"], row["verdict"])),
-        exchanged={group: int((exchanged[group] & decided[group]).sum()) for group in pairs},
-        guessed={group: int((exchanged[group] & ~decided[group]).sum()) for group in pairs},
+        exchanged={group: int(surely[group].sum()) for group in pairs},
+        guessed={group: int((exchanged[group] & ~surely[group]).sum()) for group in pairs},
         undecided={group: int((~decided[group] & seen[group]).sum()) for group in pairs},
         p_global={group: found[group].p_global for group in pairs},
     )
@@ -131,6 +133,11 @@ def _levels(names: Sequence[str], group: str) -> dict[str, list[tuple[int, int]]
     return {level: pairs for level, pairs in levels.items() if pairs}
 
 
+def _surely(found: _memo.LimbSides) -> npt.NDArray[np.bool_]:
+    """(T, L) whether each level was exchanged with certainty."""
+    return found.level_flipped & found.level_decided
+
+
 def _seen(keypoints: Keypoints, levels: dict[str, list[tuple[int, int]]]) -> npt.NDArray[np.bool_]:
     """(T,) whether any joint of a group is seen."""
     joints = [joint for pairs in levels.values() for pair in pairs for joint in pair]
@@ -141,7 +148,9 @@ def _seen(keypoints: Keypoints, levels: dict[str, list[tuple[int, int]]]) -> npt
 def _rows(
     keypoints: Keypoints, group: str, found: _memo.LimbSides, seen: npt.NDArray[np.bool_]
 ) -> Iterator[dict[str, Any]]:
-    flipped, probability, reasons = found.level_flipped, found.level_p_flipped, found.reason
+    probability, reasons = found.level_p_flipped, found.reason
+    surely = _surely(found)
+    guessed = found.level_flipped & ~surely
 
     def row(first: int, last: int, told: int, levels: Any, verdict: str, p: float) -> dict[str, Any]:
         return {
@@ -155,10 +164,10 @@ def _rows(
             "reason": reasons[told],
         }
 
-    for t in np.flatnonzero(flipped.any(axis=1) & seen).tolist():
-        levels = [name for name, own in zip(found.levels, flipped[t], strict=True) if own]
-        verdict = "flipped" if found.decided[t] else "guessed"
-        yield row(t, t, t, levels, verdict, float(probability[t][flipped[t]].min()))
+    for verdict, flipped in {"flipped": surely, "guessed": guessed}.items():
+        for t in np.flatnonzero(flipped.any(axis=1) & seen).tolist():
+            levels = [name for name, own in zip(found.levels, flipped[t], strict=True) if own]
+            yield row(t, t, t, levels, verdict, float(probability[t][flipped[t]].min()))
     doubt = np.flatnonzero(~found.decided & seen)
     for run in np.split(doubt, np.flatnonzero(np.diff(doubt) > 1) + 1):
         if len(run):

@@ -30,6 +30,11 @@ result! {
             let flipped: Vec<bool> = found.verdicts.iter().flat_map(|v| v.level_flipped.clone()).collect();
             flipped.into_pyarray(py).reshape([found.verdicts.len(), group.levels.len()])?
         },
+        /// Whether these labels are decided, (T, L).
+        level_decided: Py<PyArray2<bool>> = {
+            let decided: Vec<bool> = found.verdicts.iter().flat_map(|v| v.level_decided.clone()).collect();
+            decided.into_pyarray(py).reshape([found.verdicts.len(), group.levels.len()])?
+        },
         /// Probability that they are exchanged, (T, L).
         level_p_flipped: Py<PyArray2<f64>> = {
             let p: Vec<f64> = found.verdicts.iter().flat_map(|v| v.level_probability.clone()).collect();

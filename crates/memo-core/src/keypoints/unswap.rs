@@ -230,6 +230,8 @@ pub enum Reason {
 pub struct SideVerdict {
     /// Whether each level's entries were swapped.
     pub level_flipped: Vec<bool>,
+    /// Whether the probability of each level's output label suffices for a decision, too.
+    pub level_decided: Vec<bool>,
     /// Posterior probability that each level was swapped in the input; a level that is not visible takes
     /// the value of the nearest visible one.
     pub level_probability: Vec<f64>,
@@ -549,6 +551,7 @@ impl<'a> Limb<'a> {
     fn verdicts(&self, solution: &Solution, runs: &[FrameRun], options: &UnswapOptions) -> Vec<SideVerdict> {
         let nothing = SideVerdict {
             level_flipped: vec![false; self.levels],
+            level_decided: vec![false; self.levels],
             level_probability: vec![0.5; self.levels],
             flipped: false,
             partial: false,
@@ -576,13 +579,18 @@ impl<'a> Limb<'a> {
             let flipped = bits >> telling & 1 == 1;
             let right = self.probability_of_path(solution, step, telling);
             let decided = right >= options.decided_at;
-            // A level whose joints coincide takes the label of the most informative level.
+            // A level whose joints coincide takes the label of the most informative level, but is not exchanged where its
+            // own labels are rather right.
             let sure = |level: usize| self.probability_of_path(solution, step, level) >= LEVEL_PARTS;
+            let follows = |level: usize| flipped && (!decided || p(level) >= 0.5);
             let level_flipped: Vec<bool> =
-                sources.iter().map(|&l| if sure(l) { bits >> l & 1 == 1 } else { flipped }).collect();
+                sources.iter().map(|&l| if sure(l) { bits >> l & 1 == 1 } else { follows(l) }).collect();
+            let right = |(&level, &flipped): (&usize, &bool)| if flipped { p(level) } else { 1.0 - p(level) };
+            let level_right = sources.iter().zip(&level_flipped).map(right);
             let differs = |level: usize| seen >> level & 1 == 1 && level_flipped[level] != flipped;
             verdicts[t] = SideVerdict {
                 partial: (0..self.levels).any(differs),
+                level_decided: level_right.map(|p| decided && p >= options.decided_at).collect(),
                 level_flipped,
                 level_probability: sources.iter().map(|&level| p(level)).collect(),
                 flipped,

@@ -348,3 +348,29 @@ fn a_pair_weighs_as_its_two_scores_together() {
     assert!((found.weight - 2.0 / 3.0).abs() < 1e-12);
     assert!(sample(&keypoints, 0, 0, 2).is_none());
 }
+
+/// Where the ankles are exchanged alone, the knees, which nearly coincide, are not exchanged with them.
+#[test]
+fn a_level_that_is_rather_right_is_not_exchanged_with_another() {
+    let times_s = times(60);
+    let points = two_levels(&times_s, |t| if (20..26).contains(&t) { 2 } else { 0 });
+    let mut random = Random::new(4);
+    for _ in 0..20 {
+        let noisy: Vec<[f64; 2]> =
+            points.iter().map(|p| p.map(|x| x + 4.0 * f64::from(random.normal_pair()[0]))).collect();
+        let found = solve_legs(&times_s, &noisy, &UnswapOptions::default());
+        for (t, verdict) in found.verdicts.iter().enumerate() {
+            for level in 0..2 {
+                let [flipped, p] =
+                    [f64::from(u8::from(verdict.level_flipped[level])), verdict.level_probability[level]];
+                assert!(!verdict.decided || flipped == 0.0 || p >= 0.5, "frame {t} level {level}: {p}");
+                let right = if flipped == 1.0 { p } else { 1.0 - p };
+                assert_eq!(
+                    verdict.level_decided[level],
+                    verdict.decided && right >= 0.9,
+                    "frame {t} level {level}: {p}"
+                );
+            }
+        }
+    }
+}
