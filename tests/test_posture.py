@@ -814,3 +814,21 @@ def triangulated(path):
     points = values[:, 2:].reshape(len(values), -1, 3)[..., [2, 0, 1]]
     short = [f"{name[0].upper()}{name.split('_')[1].capitalize()}" for name in LIMB_JOINTS]
     return points[:, [markers.index(name) for name in short]]
+
+
+def test_what_is_undecided_does_not_depend_on_rounding(scene):
+    """Segments that are too short to reach their rays have an extent of zero, or of a rounding error."""
+    folder, truth = scene
+    pixels = project(truth) + np.random.default_rng(3).normal(0, 3.0, (*truth.shape[:2], 2))
+    lengths_m = {name: 0.94 * length_m for name, length_m in true_lengths(truth).items()}
+    camera = memo.Camera.from_toml(folder / "camera.toml")
+
+    def posture(noise_px):
+        moved = pixels + np.random.default_rng(0).normal(0, noise_px, pixels.shape)
+        points = memo.Keypoints.from_arrays(moved, names=JOINTS, fps=25, image_size=SIZE)
+        return memo.posture(points, camera=camera, lengths=lengths_m, noise_px=3)
+
+    as_given, nearly = posture(0.0), posture(1e-9)
+    assert (as_given.gap_m > 0).sum() > 20
+    np.testing.assert_allclose(nearly.p_mirrored, as_given.p_mirrored, atol=1e-4)
+    np.testing.assert_array_equal(nearly.undecided_joints, as_given.undecided_joints)

@@ -20,6 +20,10 @@ const LONGEST: usize = 4;
 /// Rounds of mirroring. Each round applies all mirrorings that reduce the cost and do not overlap a better one.
 const ROUNDS: usize = 8;
 
+/// An extent smaller than this share of its standard deviation is zero: that of a segment too short to reach its ray is
+/// either sign of a rounding error.
+const ZERO_SD: f64 = 1e-6;
+
 /// Number of innovations whose variances are multiplied before a logarithm is taken: far from overflow.
 const LOG_EVERY: usize = 8;
 
@@ -102,8 +106,11 @@ impl Chain<'_> {
 
     /// Frames at which a bit's segment may be perpendicular to its ray, with the first frame and the end.
     fn bounds(&self, states: &[usize], bit: usize) -> Vec<usize> {
-        let extents: Vec<Measured> =
-            states.iter().enumerate().map(|(t, &state)| (self.extent)(bit, t, state)).collect();
+        let extent = |(t, &state): (usize, &usize)| {
+            let Measured { value, sd } = (self.extent)(bit, t, state);
+            Measured { value: if value.abs() <= ZERO_SD * sd { 0.0 } else { value }, sd }
+        };
+        let extents: Vec<Measured> = states.iter().enumerate().map(extent).collect();
         let size = |t: usize| extents[t].value.abs();
         let mut bounds = vec![0];
         for t in 1..states.len() {
@@ -297,6 +304,14 @@ mod tests {
         let mut unseen = [high; 12];
         unseen[3..5].fill(f64::NAN);
         assert_eq!(bounds(unseen, 0.01), [0, 3, 5, 12]);
+        // Where the segment is too short to reach its ray, the extent is zero but for rounding.
+        let short = |rounded: [f64; 4]| {
+            let mut values = [high; 12];
+            values[4..8].copy_from_slice(&rounded);
+            bounds(values, 0.01)
+        };
+        assert_eq!(short([0.0; 4]), [0, 7, 12]);
+        assert_eq!(short([1e-15, -1e-15, 2e-15, -1e-16]), short([0.0; 4]));
     }
 
     /// A path mirrored over a stretch is corrected, for any number of excursions in the stretch.
