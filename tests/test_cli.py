@@ -342,18 +342,19 @@ def test_heel_strikes_are_compared_by_time_and_side():
     assert strikes_from_truth(SimpleNamespace(columns={"time_s": np.array([])}, events=[]), columns) == {}
 
 
-def interrupted(process, started, after_s=0.3):
-    """Sends Ctrl-C a little after work has begun; gives the exit code and what was complained."""
+def interrupted(process, started, after_s=0.3, end=signal.SIGINT):
+    """Sends a signal a little after work has begun; gives the exit code and what was complained."""
     deadline = time.monotonic() + 30
     while not started() and process.poll() is None and time.monotonic() < deadline:
         time.sleep(0.02)
     time.sleep(after_s)
-    process.send_signal(signal.SIGINT)
+    process.send_signal(end)
     _, complaint = process.communicate(timeout=60)
     return process.returncode, complaint
 
 
-def test_interrupt_writes_what_was_tracked(write_video, luma_frames, tmp_path):
+@pytest.mark.parametrize("end", [signal.SIGINT, signal.SIGTERM])
+def test_interrupt_writes_what_was_tracked(write_video, luma_frames, tmp_path, end):
     video, started = write_video("long.mp4", luma_frames(count=400)), tmp_path / "started"
     process = subprocess.Popen(
         [sys.executable, "-c", WITH_FAKE_CORE, "track", str(video), "--out", str(tmp_path / "out")],
@@ -361,7 +362,7 @@ def test_interrupt_writes_what_was_tracked(write_video, luma_frames, tmp_path):
         stderr=subprocess.PIPE,
         text=True,
     )
-    code, complaint = interrupted(process, started.exists)
+    code, complaint = interrupted(process, started.exists, end=end)
     assert code == 130 and complaint.count("\n") == 1 and "interrupted" in complaint
     assert 1 <= len(read_track_csv(tmp_path / "out" / "track.csv")["frame"]) < 400
     assert read_run(tmp_path / "out")["interrupted"] is True

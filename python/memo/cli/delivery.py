@@ -159,18 +159,24 @@ def terminal(delivery: Delivery) -> Console | None:
 
 
 class Interrupt(contextlib.AbstractContextManager["Interrupt"]):
-    """Turns the first Ctrl-C into a request, so that no frame is half processed; the second is raised."""
+    """Turns the first Ctrl-C, or request to end, into one of its own, so that no frame is half processed; a
+    second one acts as usual."""
 
     def __init__(self) -> None:
         self.requested: bool = False
 
     def __enter__(self) -> Interrupt:
-        self._before = signal.signal(signal.SIGINT, self._request)
+        ends = (signal.SIGINT, signal.SIGTERM)
+        self._before = {end: signal.signal(end, self._request) for end in ends}
         return self
 
     def __exit__(self, *_: object) -> None:
-        signal.signal(signal.SIGINT, self._before)
+        self._restore()
 
     def _request(self, *_: object) -> None:
         self.requested = True
-        signal.signal(signal.SIGINT, self._before)
+        self._restore()
+
+    def _restore(self) -> None:
+        for end, before in self._before.items():
+            signal.signal(end, before)
