@@ -446,10 +446,10 @@ class Track:
         return said + left_out
 
     def _height_sentences(self) -> list[str]:
-        given = self._options.get("height_m")
-        if not (self.walks and self._is_everybody and np.size(given) > 1):
+        given = np.atleast_1d(np.asarray(self._options.get("height_m"))).tolist()
+        if not (self.walks and self._is_everybody and len(given) > 1):
             return []
-        return given_height_sentences(np.asarray(given).tolist(), zip(self.people, self.walks, strict=True))
+        return given_height_sentences(given, zip(self.people, self.walks, strict=True))
 
     def _flicker_sentences(self) -> list[str]:
         seek = self.seek_report

@@ -125,7 +125,7 @@ def add_track(app: "typer.Typer") -> None:
 
 
 def _track(recording: Recording, delivery: Delivery) -> Exit:
-    tracked: list[Recorded] = []
+    in_tables: list[Recorded] = []
     try:
         with with_steps(delivery) as progress:
             recorded = track_recording(
@@ -134,10 +134,10 @@ def _track(recording: Recording, delivery: Delivery) -> Exit:
                 progress=progress,
                 remark=complain,
                 stop=Interrupt(),
-                tracked=tracked.append,
+                tracked=in_tables.append,
             )
     except (ValueError, OSError, KeyboardInterrupt):
-        for found in tracked:  # what was found is known, though not drawn
+        for found in in_tables:  # what was found is known, though not drawn
             report(found, delivery)
         raise
     if recorded.interrupted:
