@@ -104,7 +104,8 @@ impl Chain<'_> {
         flips
     }
 
-    /// Frames at which a bit's segment may be perpendicular to its ray, with the first frame and the end.
+    /// Frames at which a bit's segment may be perpendicular to its ray or begins or ends to be too short for it, with the
+    /// first frame and the end.
     fn bounds(&self, states: &[usize], bit: usize) -> Vec<usize> {
         let extent = |(t, &state): (usize, &usize)| {
             let Measured { value, sd } = (self.extent)(bit, t, state);
@@ -117,7 +118,10 @@ impl Chain<'_> {
             let least = size(t) <= size(t - 1) && (t + 1 == states.len() || size(t) < size(t + 1));
             let crossing = extents[t - 1].value * extents[t].value < 0.0;
             let unseen = extents[t].value.is_nan() != extents[t - 1].value.is_nan();
-            if crossing || unseen || (least && size(t) <= 2.0 * extents[t].sd) {
+            // Frames in which the segment is too short belong to the excursion before or after them.
+            let is_short = |t: usize| size(t) == 0.0;
+            let short = is_short(t) != is_short(t - 1);
+            if crossing || unseen || short || (least && size(t) <= 2.0 * extents[t].sd) {
                 bounds.push(t);
             }
         }
@@ -310,7 +314,7 @@ mod tests {
             values[4..8].copy_from_slice(&rounded);
             bounds(values, 0.01)
         };
-        assert_eq!(short([0.0; 4]), [0, 7, 12]);
+        assert_eq!(short([0.0; 4]), [0, 4, 7, 8, 12]);
         assert_eq!(short([1e-15, -1e-15, 2e-15, -1e-16]), short([0.0; 4]));
     }
 
