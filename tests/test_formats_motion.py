@@ -38,6 +38,31 @@ def test_absent_frames_become_empty_ones():
     assert motion.angles["knee"][61] == 61 and np.isnan(motion.angles["knee"][11])
 
 
+@pytest.mark.parametrize("rate_hz", [24, 25, 29.97, 30, 50, 59.94, 60, 100, 120, 240, 29.83, 7.3])
+@pytest.mark.parametrize("gap", [1, 20, 60, 100, 1000, 3000])
+@pytest.mark.parametrize("whole_ms", [np.round, np.floor])
+def test_frames_are_counted_over_a_gap_in_stamps_of_milliseconds(rate_hz, gap, whole_ms):
+    kept = np.r_[0:60, 60 + gap : 120 + gap, 122 + gap : 182 + gap]
+    found, motion = line(whole_ms(1000 * kept / rate_hz + 1e-6) / 1000).at_constant_rate()
+    assert found == pytest.approx(rate_hz, rel=1e-5)
+    assert np.flatnonzero(np.isfinite(motion.points[:, 0, 0])).tolist() == kept.tolist()
+
+
+def test_exact_stamps_near_a_whole_rate_keep_their_own():
+    kept = np.r_[0:40, 1540:1580]
+    found, motion = line(kept / 29.99).at_constant_rate()
+    assert found == pytest.approx(29.99, rel=1e-9) and len(motion.times_s) == 1580
+
+
+@pytest.mark.parametrize("rate_hz", [24, 29.97, 30, 59.94, 60, 120, 240])
+def test_jittered_stamps_are_refused_with_the_rate_they_have(rate_hz):
+    kept = np.r_[0:200, 300:500]
+    off = np.random.default_rng(3).uniform(-0.3, 0.3, len(kept))
+    for digits in (3, 6):
+        with pytest.raises(FormatError, match=rf"give --rate {round(rate_hz)} to interpolate"):
+            line(np.round((1 + kept + off) / rate_hz, digits)).at_constant_rate()
+
+
 def test_stamps_without_a_rate_are_refused_with_what_came():
     times_s = np.cumsum(np.random.default_rng(0).uniform(0.02, 0.05, 50))
     with pytest.raises(
