@@ -332,6 +332,23 @@ def test_broken_openpose_files_are_refused(tmp_path, text, message):
     assert str(folder) in str(error.value) and one_line(error) and len(str(error.value)) < 600
 
 
+def test_files_named_by_time_stamps_are_refused_by_name(tmp_path):
+    names = layouts()["COCO_18"]
+    frame = json.dumps(openpose_frame(figure(names)))
+    # Nanoseconds and milliseconds: no part of these numbers counts frames.
+    for folder, stamps in (
+        ("ns", (1700000000033333338, 1700000000066666676, 1700000000100000004)),
+        ("ms", (1700000000033, 1700000000067, 1700000000100)),
+    ):
+        (tmp_path / folder).mkdir()
+        for stamp in stamps:
+            (tmp_path / folder / f"{stamp}_keypoints.json").write_text(frame)
+        said = f"{stamps[0]}_keypoints.json: {stamps[0]} in the name is not a frame number"
+        with pytest.raises(KeypointsError, match=said) as error:
+            read_keypoints(tmp_path / folder, fps=30)
+        assert one_line(error)
+
+
 def test_folders_that_are_no_sequence_are_refused(tmp_path):
     names = layouts()["COCO_18"]
     frame = json.dumps(openpose_frame(figure(names)))
@@ -430,6 +447,8 @@ def test_coco_annotations_keep_their_visibility(tmp_path):
         ('{"people": []}', "give the folder"),
         ('[{"image_id": 1}]', "entry 0: needs image_id and keypoints"),
         ('[{"image_id": "a.png", "keypoints": [1, 2, 3]}]', "image_id a.png has no frame number"),
+        ('[{"image_id": "1700000000033333338.png", "keypoints": [1, 2, 3]}]', "is not a frame number"),
+        (f'[{{"image_id": "{"7" * 5000}.png", "keypoints": [1, 2, 3]}}]', "has no frame number"),
         ('[{"image_id": 1e99, "keypoints": [1, 2, 3]}]', "no frame number"),
         ('[{"image_id": -1, "keypoints": [1, 2, 3]}]', "not a frame number"),
         (

@@ -15,7 +15,7 @@ from typing import Any
 
 from memo.keypoints.found import Found, Person, check_all_placed, triples, with_points
 from memo.keypoints.layout import in_layout
-from memo.keypoints.points import Array, Keypoints, KeypointsError, Source
+from memo.keypoints.points import MAX_FRAME, Array, Keypoints, KeypointsError, Source
 from memo.keypoints.text import MAX_FRAME_FILE_BYTES, content_of, json_text, last_number, parsed
 from memo.unfinished import complete_folder
 
@@ -116,6 +116,11 @@ def numbered_files(folder: Path, ending: str = ".json") -> dict[int, Path]:
         frame = last_number(file.stem)
         if frame is None:
             raise KeypointsError(f"{file}: no frame number in the name")
+        if frame > MAX_FRAME:
+            raise KeypointsError(
+                f"{file}: {frame} in the name is not a frame number, which is at most {MAX_FRAME}:"
+                " number the files by frame"
+            )
         if frame in numbered:
             other = numbered[frame].name
             raise KeypointsError(

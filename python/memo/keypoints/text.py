@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from memo.files import read_text
-from memo.keypoints.points import MAX_FRAME, KeypointsError
+from memo.keypoints.points import KeypointsError
 from memo.unfinished import write_complete
 
 __all__ = ["content_of", "json_text", "last_number", "parsed", "short", "write_text"]
@@ -16,6 +16,7 @@ __all__ = ["content_of", "json_text", "last_number", "parsed", "short", "write_t
 MAX_FRAME_FILE_BYTES = 64 << 20
 MAX_FILE_BYTES = 512 << 20
 LONGEST_NAME = 60
+_MOST_DIGITS = 255  # names of files are not longer; Python converts 4300
 
 
 def content_of(path: Path, most: int = MAX_FILE_BYTES) -> str:
@@ -53,10 +54,9 @@ def write_text(out: Path, text: str) -> None:
 
 
 def last_number(text: str) -> int | None:
-    """The last number in a name: the frame number."""
-    digits = re.findall(r"[0-9]{1,18}", text)
-    number = int(digits[-1]) if digits else None
-    return number if number is not None and number <= MAX_FRAME else None
+    """The last number in a name: the frame number, if it is at most `MAX_FRAME`."""
+    digits = re.findall(r"[0-9]+", text)
+    return int(digits[-1]) if digits and len(digits[-1]) <= _MOST_DIGITS else None
 
 
 def short(value: Any) -> str:
