@@ -164,6 +164,20 @@ def test_the_states_file_of_a_simulation_is_read(tmp_path):
     )
 
 
+def test_the_metres_of_a_planar_model_are_no_angles(tmp_path):
+    path = tmp_path / "planar.mot"
+    rows = "".join(f"{k}\t{-0.1 * k}\t{1 + 0.01 * k}\t0.95\t0.5\n" for k in range(3))
+    labels = "time\tpelvis_tilt\tpelvis_tx\tpelvis_ty\thip_flexion_r\n"
+    path.write_text("x\nnRows=3\nnColumns=5\ninDegrees=no\nendheader\n" + labels + rows)
+    motion = read_motion(path)
+    table = by_pandas(path, 5)
+    assert motion.names == () and [*motion.angles] == ["pelvis_tilt", "right_hip"]
+    assert motion.angles["pelvis_tilt"] == pytest.approx(np.rad2deg(table["pelvis_tilt"]))
+    assert motion.notes == ("Left out, positions without all of x, y and z: pelvis_tx, pelvis_ty.",)
+    write_motion(tmp_path / "again.mot", motion)
+    assert [*by_pandas(tmp_path / "again.mot", 7)] == ["time", "pelvis_tilt", "hip_flexion_r"]
+
+
 def test_knees_with_the_sign_of_gait2392_are_turned(tmp_path):
     path = tmp_path / "gait2392.mot"
     rows = "".join(f"{k}\t{-60 * k}\t{3 - k}\n" for k in range(3))

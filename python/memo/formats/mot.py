@@ -19,11 +19,11 @@ posture`, whose hip angles are against the trunk. `pelvis_tx`, `pelvis_ty`, `pel
 between the anterior superior iliac spines, as far from the hips as in the unscaled model. Instants with a
 missing value are left out, since OpenSim stops reading there.
 
-In reading, a triple `NAME_tx`, `NAME_ty`, `NAME_tz` is a point. Columns of forces, moments and the like are
-left out, as are columns of a states file that are not the value of a coordinate;
-`/jointset/hip_r/hip_flexion_r/value` is `hip_flexion_r`. All other columns are assumed to be angles, as the
-format does not tell. A knee that bends further backwards than knees can has the sign of gait2392, and is
-reversed. Tables of vectors (`DataType=Vec3`) are not read.
+In reading, a triple `NAME_tx`, `NAME_ty`, `NAME_tz` is a point; one or two of them, as in planar models, are
+left out. Columns of forces, moments and the like are left out, as are columns of a states file that are not
+the value of a coordinate; `/jointset/hip_r/hip_flexion_r/value` is `hip_flexion_r`. All other columns are
+assumed to be angles, as the format does not tell. A knee that bends further backwards than knees can has the
+sign of gait2392, and is reversed. Tables of vectors (`DataType=Vec3`) are not read.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ import numpy as np
 
 from memo import _memo
 from memo.formats.motion import FormatError, Motion, Up, from_z_up, to_z_up
-from memo.formats.names import joints_found
+from memo.formats.names import joints_found, listed
 from memo.formats.reading import Given, chosen_up
 from memo.formats.text import numbers, read_lines, whole_number
 from memo.unfinished import complete_file
@@ -88,6 +88,7 @@ _PLUG_IN_GAIT = {
 
 _OURS = {name: joint for joint, name in OPENSIM.items()}
 _NO_ANGLES = ("/", "force", "moment", "torque", "ground_", "activation", "power", "emg")
+_TRANSLATIONS = ("_tx", "_ty", "_tz")
 _OF_ARMS = ("shoulder", "elbow")
 _MOST_HEADER_LINES = 1000
 _BACKWARDS_DEG = 30.0  # farther than any knee bends backwards
@@ -118,9 +119,10 @@ def read_mot(path: Path, given: Given) -> Motion:
     in_degrees = header.get("indegrees")
     if in_degrees not in ("yes", "no", None):
         raise FormatError(f"field inDegrees: {in_degrees!r}, wanted yes or no")
-    angles, others = {}, []
+    angles, others, partial = {}, [], []
     for name in labels[1:]:
-        if any(name == f"{point}_t{axis}" for point in names for axis in "xyz"):
+        if name.endswith(_TRANSLATIONS):
+            partial += [name] * (name[:-3] not in names)
             continue
         if any(word in name.lower() for word in _NO_ANGLES):
             others.append(name)
@@ -135,6 +137,8 @@ def read_mot(path: Path, given: Given) -> Motion:
         notes.append("Knees bend towards negative angles, as in gait2392: their sign was reversed.")
     if in_degrees is None:
         notes.append("The file does not say whether angles are in degrees: degrees were assumed.")
+    if partial:
+        notes.append(f"Left out, positions without all of x, y and z: {listed(partial)}.")
     if others:
         notes.append(f"Left out, not angles: {counted(len(others), 'column')}, the first {others[0]}.")
     if not names and not angles:
