@@ -130,6 +130,19 @@ def test_the_legs_hang_from_the_pelvis_of_a_mot_as_they_do_in_the_motion(tmp_pat
         assert [*by_pandas(path, 7)] == ["time", "knee_angle_l"]
 
 
+def test_a_pelvis_that_is_hardly_known_is_named_among_what_is_left_out(tmp_path):
+    motion, path = walk(gaps=False), tmp_path / "walk.mot"
+    motion.points[:12, JOINTS.index("right_hip")] = np.nan
+    motion.angles["right_knee"][:12] = np.nan
+    pelvis = "pelvis_tilt, pelvis_list, pelvis_rotation, pelvis_tx, pelvis_ty, pelvis_tz"
+    assert write_motion(path, motion) == [
+        f"Left out, missing at most instants: {pelvis}, knee_angle_r.",
+        "A MOT or STO file cannot store events: left out.",
+        "A MOT or STO file cannot store points: left out.",
+    ]
+    assert [*by_pandas(path, 7)] == ["time", "hip_flexion_r", "knee_angle_l"]
+
+
 def test_the_pelvis_angles_are_those_of_plug_in_gait(tmp_path):
     """Plug-in Gait's own come from four markers, memo's from the hips, the right knee and the flexions."""
     motion = read_motion(shared_motion("mocap", "formats", "PiG__PiG_Motion-FlatFoot-Hole.c3d"))

@@ -164,9 +164,9 @@ def write_mot(path: Path, motion: Motion, up: Up, model: Model = RAJAGOPAL) -> l
     names = OPENSIM | _PLUG_IN_GAIT
     columns |= {names.get(name, name): values for name, values in motion.angles.items()}
     # A joint that is hardly seen must not cost the others their instants.
-    rare = [name for name, values in columns.items() if 2 * np.isfinite(values).sum() < len(values)]
+    rare = {name: v for name, v in columns.items() if 2 * np.isfinite(v).sum() < len(v)}
     columns = {name: values for name, values in columns.items() if name not in rare}
-    rare = [name for name in rare if np.isfinite(motion.angles.get(_OURS.get(name, name), np.nan)).any()]
+    rare = {name: values for name, values in rare.items() if np.isfinite(values).any()}
     for name in columns:
         if not name.isprintable() or " " in name:
             raise FormatError(f"angle {name!r}: the labels of a MOT file have no white space")
@@ -201,7 +201,8 @@ def write_mot(path: Path, motion: Motion, up: Up, model: Model = RAJAGOPAL) -> l
     if origin is None and motion.names:
         notes.append("The pelvis position needs both hips, a knee and the flexion of that hip: left out.")
     left_out = ["events"] * bool(motion.events)
-    left_out += ["points except the pelvis"] * (len(motion.names) > 1)
+    points = "points except the pelvis" if "pelvis_tx" in columns else "points"
+    left_out += [points] * (len(motion.names) > 1)
     if armless:
         notes.append(f"The model has no arms: {', '.join(armless)} left out.")
     return notes + [f"A MOT or STO file cannot store {what}: left out." for what in left_out]
