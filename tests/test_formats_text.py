@@ -92,6 +92,30 @@ def test_a_stranger_reads_the_mot_that_is_written(tmp_path):
         assert np.allclose(by_pandas(again, 7)[[*table]], table, atol=1e-6)
 
 
+@pytest.mark.parametrize("name", ["nRows=9", "datarows 9", "endheader", "inDegrees=no", "a\nnRows=9"])
+def test_no_name_of_a_mot_is_a_key_of_its_header(tmp_path, name):
+    motion, path = walk(), tmp_path / f"{name}.mot"
+    write_motion(path, motion)
+    head = path.read_text().split("\n")[:7]
+    assert head[0] == f"motion {' '.join(name.split())}"
+    assert head[1:] == ["version=1", "nRows=19", "nColumns=10", "inDegrees=yes", "up=Y", "endheader"]
+    known = np.isfinite(motion.angles["left_knee"])
+    assert np.allclose(read_motion(path).angles["right_hip"], motion.angles["right_hip"][known], atol=1e-6)
+
+
+@pytest.mark.parametrize("title", ["nRows=9", "endheader", "inDegrees=no", "inDegrees = maybe"])
+def test_lines_of_a_mots_header_count_more_than_its_title(tmp_path, title):
+    path = tmp_path / "titled.mot"
+    path.write_text(f"{title}\nnRows=1\ninDegrees=yes\nendheader\ntime\tlumbar\n0\t30\n")
+    motion = read_motion(path)
+    assert motion.angles["lumbar"].tolist() == [30] and motion.notes == ()
+    # A table may have no title: the first line is then a key.
+    path.write_text("inDegrees=no\nDataType=double\nendheader\ntime\tlumbar\n0\t1\n")
+    assert read_motion(path).angles["lumbar"] == pytest.approx(180 / np.pi)
+    path.write_text("endheader\ntime\tlumbar\n0\t1\n")
+    assert read_motion(path).angles["lumbar"].tolist() == [1]
+
+
 def about(axis, angle_deg):
     """(3, 3) rotation about x, y or z."""
     c, s = np.cos(np.deg2rad(angle_deg)), np.sin(np.deg2rad(angle_deg))

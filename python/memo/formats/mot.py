@@ -177,7 +177,7 @@ def write_mot(path: Path, motion: Motion, up: Up, model: Model = RAJAGOPAL) -> l
     gaps = len(table) - len(known)
     table = table[known]
     head = [
-        path.stem.replace("\n", " "),
+        " ".join(["motion", *path.stem.split()]),  # a title that is no key, whatever the file's name
         "version=1",
         f"nRows={len(table)}",
         f"nColumns={len(columns)}",
@@ -227,16 +227,18 @@ def _of_model(motion: Motion, model: Model) -> tuple[Motion, list[str]]:
 
 def _header(lines: list[str]) -> tuple[dict[str, str], int]:
     """Keys (lower case) with their values, and the index of the line after `endheader`."""
+    head = [line.strip() for line in lines[:_MOST_HEADER_LINES]]
+    ends = [index for index, text in enumerate(head) if text.lower() == "endheader"]
+    if not ends:
+        raise FormatError(f"no line endheader among the first {len(head)}")
+    end = ends[1] if ends[0] == 0 and len(ends) > 1 else ends[0]
     header: dict[str, str] = {}
-    for index, line in enumerate(lines[:_MOST_HEADER_LINES]):
-        text = line.strip()
-        if text.lower() == "endheader":
-            return header, index + 1
+    for text in head[1:end] + head[:1]:  # the first line may be a title, which may look like a key
         key, is_pair, value = text.partition("=")
         if not is_pair:
             key, _, value = text.partition(" ")
         header.setdefault(key.strip().lower(), value.strip().lower())
-    raise FormatError(f"no line endheader among the first {min(len(lines), _MOST_HEADER_LINES)}")
+    return header, end + 1
 
 
 def _coordinate(label: str) -> str:
