@@ -254,6 +254,26 @@ def test_labels_that_fit_no_file_are_refused(tmp_path):
     assert [*tmp_path.iterdir()] == []
 
 
+@pytest.mark.parametrize(
+    ("start_s", "first", "says"),
+    [
+        (0.52, 13, None),
+        (0.5204, 13, None),  # a stamp in milliseconds would be as far off
+        (0.513, 13, "this motion, from 0.513 s, begins at 0.52 s"),
+        (-1.013, 0, "this motion, from -1.013 s, begins at 0 s"),
+    ],
+)
+def test_a_change_of_the_first_time_is_reported(tmp_path, start_s, first, says):
+    motion, path = walk(rate_hz=25, start_s=start_s), tmp_path / "walk.c3d"
+    notes = write_motion(path, motion)
+    assert notes == ([f"A C3D file counts whole frames from 0 s: {says}."] if says else [])
+    file = ezc3d.c3d(str(path))
+    assert file["header"]["points"]["first_frame"] == first
+    # The events are as far from the first frame as before.
+    times_s = file["parameters"]["EVENT"]["TIMES"]["value"][1]
+    assert np.allclose(times_s - first / 25, [0.1234, 0.25], atol=1e-6)
+
+
 @pytest.mark.parametrize("up", ["z", "y"])
 def test_without_y_screen_up_is_the_axis_along_which_the_figure_stands(tmp_path, up):
     motion, path = walk(), tmp_path / "walk.c3d"

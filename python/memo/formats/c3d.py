@@ -32,7 +32,16 @@ from typing import Any
 import numpy as np
 
 from memo import _memo
-from memo.formats.motion import MAX_FRAMES, FormatError, GaitEvent, Motion, Up, from_z_up, to_z_up
+from memo.formats.motion import (
+    MAX_FRAMES,
+    STAMP_ERROR_S,
+    FormatError,
+    GaitEvent,
+    Motion,
+    Up,
+    from_z_up,
+    to_z_up,
+)
 from memo.formats.names import standing_up
 from memo.formats.reading import Given, chosen_up, unit_of
 from memo.unfinished import complete_file
@@ -409,7 +418,7 @@ def _header_events(data: bytes, file: _File) -> tuple[tuple[str, float], ...]:
 
 
 def write_c3d(path: Path, motion: Motion, up: Up) -> list[str]:
-    """Writes points in millimetres, angles in degrees and events; returns what was left out, in sentences."""
+    """Writes points in millimetres, angles in degrees and events; returns what was changed, in sentences."""
     rate_hz, motion = motion.at_constant_rate()
     first = max(1, round(float(motion.times_s[0]) * rate_hz) + 1)
     frames = len(motion.times_s)
@@ -441,7 +450,12 @@ def write_c3d(path: Path, motion: Motion, up: Up) -> list[str]:
         file.write(words.tobytes())
         if frames <= 65535:  # for longer files, other programs read all frames up to the end of the file
             file.write(bytes(-words.nbytes % _BLOCK))
-    return []
+    began_s, begins_s = float(motion.times_s[0]), (first - 1) / rate_hz
+    if abs(begins_s - began_s) <= STAMP_ERROR_S:  # no more than the time stamps themselves are rounded
+        return []
+    return [
+        f"A C3D file counts whole frames from 0 s: this motion, from {began_s:g} s, begins at {begins_s:g} s."
+    ]
 
 
 def _columns(motion: Motion, up: Up) -> tuple[list[tuple[str, bool]], np.ndarray]:
