@@ -274,6 +274,21 @@ def test_a_change_of_the_first_time_is_reported(tmp_path, start_s, first, says):
     assert np.allclose(times_s - first / 25, [0.1234, 0.25], atol=1e-6)
 
 
+def test_angles_that_would_share_a_place_are_refused(tmp_path):
+    angles = {"foo": [0.0, 1], "foo_y": [2.0, 3]}
+    write_motion(tmp_path / "x.c3d", Motion(("a",), [0, 1], np.zeros((2, 1, 3)), angles=angles))
+    points, labels, _ = by_ezc3d(tmp_path / "x.c3d")
+    assert labels == ["a", "foo"] and points[:, 1].tolist() == [[0, 2, 0], [1, 3, 0]]
+    (tmp_path / "x.c3d").unlink()
+    for one, other, label in (("foo", "foo_x", "foo"), ("right_knee", "RKneeAngles_x", "RKneeAngles")):
+        for names in ((one, other), (other, one)):
+            motion = Motion(("a",), [0, 1], np.zeros((2, 1, 3)), angles={key: [7, 7] for key in names})
+            says = f"angles {names[0]} and {names[1]} are both x of the label {label}"
+            with pytest.raises(FormatError, match=says):
+                write_motion(tmp_path / "x.c3d", motion)
+    assert [*tmp_path.iterdir()] == []
+
+
 @pytest.mark.parametrize("up", ["z", "y"])
 def test_without_y_screen_up_is_the_axis_along_which_the_figure_stands(tmp_path, up):
     motion, path = walk(), tmp_path / "walk.c3d"

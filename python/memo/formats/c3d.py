@@ -462,20 +462,19 @@ def _columns(motion: Motion, up: Up) -> tuple[list[tuple[str, bool]], np.ndarray
     """Labels, each with whether it is an angle, and (T, P, 3) millimetres and degrees."""
     labels = [(name, False) for name in motion.names]
     parts = [from_z_up(motion.points, up) * 1000]
-    grouped: dict[str, dict[int, np.ndarray]] = {}
-    for name, values in motion.angles.items():
+    grouped: dict[str, dict[str, str]] = {}
+    for name in motion.angles:
         label, _, axis = name.rpartition("_")
-        if name in _FLEXIONS:
-            grouped.setdefault(_FLEXIONS[name], {})[0] = values
-        elif label and axis in ("x", "y", "z"):
-            grouped.setdefault(label, {})["xyz".index(axis)] = values
-        else:
-            grouped.setdefault(name, {})[0] = values
+        if name in _FLEXIONS or not label or axis not in ("x", "y", "z"):
+            label, axis = _FLEXIONS.get(name, name), "x"
+        other = grouped.setdefault(label, {}).setdefault(axis, name)
+        if other != name:
+            raise FormatError(f"angles {other} and {name} are both {axis} of the label {label} in a C3D file")
     for label, axes in grouped.items():
-        known = np.logical_or.reduce([np.isfinite(values) for values in axes.values()])
+        known = np.logical_or.reduce([np.isfinite(motion.angles[name]) for name in axes.values()])
         filled = np.where(known[:, None], 0.0, np.nan) * np.ones(3)
-        for place, values in axes.items():
-            filled[:, place] = values
+        for axis, name in axes.items():
+            filled[:, "xyz".index(axis)] = motion.angles[name]
         labels.append((label, True))
         parts.append(filled[:, None, :])
     names = [label for label, _ in labels]
