@@ -353,6 +353,15 @@ def test_a_folder_of_images_in_the_order_of_their_numbers(tmp_path, luma_frames)
     assert reader.frame_count == 11
 
 
+def test_files_with_a_dot_are_no_images(tmp_path, luma_frames):
+    for index, luma in enumerate(luma_frames(count=4)):
+        write_image(tmp_path / f"f{index:03}.png", luma)
+        (tmp_path / f"._f{index:03}.png").write_bytes(b"\0\5\x16\7\0\2\0\0Mac OS X        ")
+    frames, reader = read(tmp_path, rate_hz=25)
+    np.testing.assert_allclose([frame.time_s for frame in frames], np.arange(4) / 25)
+    assert reader.frame_count == 4 and reader.damage is None
+
+
 def test_frames_that_change_size_are_refused(tmp_path, luma_frames):
     write_image(tmp_path / "a1.png", luma_frames(count=1)[0])
     write_image(tmp_path / "a2.png", luma_frames(count=1, size=(40, 30))[0])

@@ -255,7 +255,12 @@ class _Folder:
     pixel_aspect = 1.0
 
     def __init__(self, path: Path, rate_hz: float | None) -> None:
-        names = [file for file in path.iterdir() if file.suffix.lower() in _IMAGE_SUFFIXES]
+        # macOS adds a file `._NAME` to each file on a disk of another system.
+        names = [
+            file
+            for file in path.iterdir()
+            if file.suffix.lower() in _IMAGE_SUFFIXES and not file.name.startswith(".")
+        ]
         if not names:
             raise VideoError(f"{path}: a folder without images")
         if rate_hz is None:
