@@ -353,6 +353,39 @@ def test_a_folder_of_images_in_the_order_of_their_numbers(tmp_path, luma_frames)
     assert reader.frame_count == 11
 
 
+@pytest.mark.parametrize(
+    ("names", "series"),
+    [
+        (("rgb_000.png", "rgb_001.png", "mask_000.png", "mask_001.png"), "mask_*.png and rgb_*.png"),
+        (("1_left.png", "1_right.png", "2_left.png", "2_right.png"), "*_left.png and *_right.png"),
+        (("f1.bmp", "f1.jpg", "f1.png", "f2.png"), "f*.bmp, f*.jpg and f*.png"),
+    ],
+)
+def test_several_series_of_images_in_a_folder_are_refused(tmp_path, luma_frames, names, series):
+    for name, luma in zip(names, luma_frames(count=len(names)), strict=True):
+        write_image(tmp_path / name, luma)
+    with pytest.raises(VideoError) as refused:
+        VideoReader(tmp_path, rate_hz=25)
+    assert f"holds several series of images, {series}; give a folder that holds one" in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ("f1.JPG", "f2.JPG", "f3.jpg", "f4.jpg"),  # numbered on
+        ("IMG_1.png", "IMG_2_BURST.png", "IMG_3.png"),
+        ("first.png", "last.png", "middle.png"),
+        ("d1_a1.png", "d1_a2.png", "d2_a1.png", "d2_a2.png"),
+    ],
+)
+def test_a_series_may_have_names_of_any_kind(tmp_path, luma_frames, names):
+    luma = luma_frames(count=len(names))
+    for name, picture in zip(names, luma, strict=True):
+        write_image(tmp_path / name, picture)
+    frames, _ = read(tmp_path, rate_hz=25)
+    assert len(frames) == len(names)
+
+
 def test_files_with_a_dot_are_no_images(tmp_path, luma_frames):
     for index, luma in enumerate(luma_frames(count=4)):
         write_image(tmp_path / f"f{index:03}.png", luma)

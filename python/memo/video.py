@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import re
 import warnings
+from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import chain, pairwise
@@ -27,7 +28,7 @@ from av.video.reformatter import ColorRange
 
 from memo import _memo
 from memo.given import nothing_at
-from memo.wording import counted
+from memo.wording import counted, enumerated
 
 __all__ = ["Frame", "VideoDamageWarning", "VideoError", "VideoReader"]
 
@@ -263,6 +264,11 @@ class _Folder:
         ]
         if not names:
             raise VideoError(f"{path}: a folder without images")
+        if several := _series(names):
+            raise VideoError(
+                f"{path}: holds several series of images, {enumerated(several)}; "
+                "give a folder that holds one of them"
+            )
         if rate_hz is None:
             raise VideoError(f"{path}: a folder of images has no time stamps; give its frame rate")
         names.sort(key=_natural_order)
@@ -303,6 +309,18 @@ def _open_source(path: Path, rate_hz: float | None) -> _File | _Folder:
 def _natural_order(path: Path) -> list[tuple[int, str]]:
     """Sorts frame9 before frame10."""
     return [(int(digits or 0), text) for text, digits in re.findall(r"(\D*)(\d*)", path.name)]
+
+
+def _series(names: list[Path]) -> list[str]:
+    """The series, such as left_* and right_*, whose images have the same numbers; none if there is only one.
+
+    Other images whose names differ by more than their numbers are of one series.
+    """
+    series: defaultdict[tuple[int, ...], set[str]] = defaultdict(set)
+    for path in names:
+        if numbers := tuple(int(digits) for digits in re.findall(r"\d+", path.name)):
+            series[numbers].add(re.sub(r"\d+", "*", path.name))
+    return next((sorted(alike) for alike in series.values() if len(alike) > 1), [])
 
 
 def _places(names: list[Path]) -> list[int]:
