@@ -262,6 +262,18 @@ def test_damage_in_the_middle_is_counted(write_video, luma_frames):
     assert np.all(np.diff([frame.time_s for frame in frames]) > 0)
 
 
+@pytest.mark.parametrize(("start", "stop"), [(0, 50), (40, 50)])
+def test_damage_is_reported_as_far_as_a_video_was_read(write_video, luma_frames, start, stop):
+    path = write_video("hurt.mp4", luma_frames(count=60), options={"bf": "0"})
+    data = bytearray(path.read_bytes())
+    at = data.index(b"mdat") + len(data) // 6
+    data[at : at + 3000] = bytes(3000)
+    path.write_bytes(data)
+    told = f"could not be decoded; {stop} frames could"
+    with VideoReader(path, start=start, stop=stop) as reader, pytest.warns(VideoDamageWarning, match=told):
+        assert len(list(reader)) == stop - start
+
+
 def test_random_damage_is_refused_or_read_around(write_video, luma_frames, tmp_path):
     rng = np.random.default_rng(7)
     whole = write_video("whole.mp4", luma_frames(count=20)).read_bytes()
@@ -330,6 +342,29 @@ def test_images_that_are_missing_by_their_numbers_take_their_time(
     np.testing.assert_allclose(times_s, np.array(frames) / 25.0)
     assert (reader.damage is None) == (absent == 0)
     assert absent == 0 or reader.damage.startswith("2 images are" if absent == 2 else "1 image is")
+
+
+@pytest.mark.parametrize(
+    ("stop", "absent"), [(2, None), (3, "1 image is"), (4, "3 images are"), (9, "3 images are")]
+)
+def test_images_are_missing_as_far_as_a_folder_was_read(tmp_path, luma_frames, stop, absent):
+    for index, luma in zip((0, 1, 3, 6, 7, 8), luma_frames(count=6), strict=True):
+        write_image(tmp_path / f"f{index}.png", luma)
+    with VideoReader(tmp_path, rate_hz=25, stop=stop) as reader, warnings.catch_warnings():
+        warnings.simplefilter("ignore", VideoDamageWarning)
+        list(reader)
+    assert (reader.damage or "None").startswith(f"{absent} missing" if absent else "None")
+
+
+@pytest.mark.parametrize("kept", [0, 20, 400])
+def test_an_image_that_was_cut_off_is_counted_and_keeps_its_place(tmp_path, luma_frames, kept):
+    for index, luma in enumerate(luma_frames(count=5)):
+        write_image(tmp_path / f"f{index}.png", luma)
+    cut = tmp_path / "f2.png"
+    cut.write_bytes(cut.read_bytes()[:kept])
+    with VideoReader(tmp_path, rate_hz=25) as reader, pytest.warns(VideoDamageWarning, match="1 piece could"):
+        times_s = [frame.time_s for frame in reader]
+    np.testing.assert_allclose(times_s, np.array([0, 1, 3, 4]) / 25)
 
 
 @pytest.mark.parametrize(("most", "unused"), [(255, 8), (4095, 4), (65535, 0)])

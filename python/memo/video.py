@@ -16,7 +16,7 @@ import warnings
 from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import chain, pairwise
+from itertools import chain, islice, pairwise
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -46,7 +46,7 @@ class VideoError(ValueError):
 
 
 class VideoDamageWarning(UserWarning):
-    """A video was read to its end, but not every frame of it could be decoded."""
+    """A video was read as far as requested, but not every frame of it could be decoded."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,9 +140,7 @@ class VideoReader:
 
     def __iter__(self) -> Iterator[Frame]:
         index = -1
-        for index, (time_s, decoded) in enumerate(self._timed()):
-            if self._stop is not None and index >= self._stop:
-                return
+        for index, (time_s, decoded) in enumerate(islice(self._timed(), self._stop)):
             if index >= self._start:
                 yield Frame(index, time_s, self._checked(index, decoded))
         if index < self._start:
@@ -179,7 +177,7 @@ class VideoReader:
 
     def _report_damage(self, read: int) -> None:
         announced, undecodable = self._source.announced, self._source.undecodable
-        missing = 0 if announced is None else announced - read
+        missing = 0 if announced is None else min(announced, self._stop or announced) - read
         if undecodable:
             self.damage = (
                 f"{counted(undecodable, 'piece')} could not be decoded; {counted(read, 'frame')} could"
@@ -276,15 +274,18 @@ class _Folder:
         self._images: Iterator[tuple[int, Path]] = iter(zip(places, names, strict=True))
         self.place: int | None = None
         """Which frame of the recording the latest image is, by its number."""
-        self.absent = places[-1] + 1 - len(names)
-        """Images that are missing between the first and the last."""
+        self.absent = 0
+        """Images that are missing between the first and the latest."""
         self.announced = len(names)
         self.rate_hz = rate_hz
         self.undecodable = 0
 
     def decoded(self) -> Iterator[av.VideoFrame]:
-        for place, image in self._images:
-            self.place = place
+        for read, (place, image) in enumerate(self._images):
+            self.place, self.absent = place, place - read
+            if image.stat().st_size == 0:
+                self.undecodable += 1
+                continue
             file = _File(image)
             try:
                 yield from file.decoded()
