@@ -505,7 +505,7 @@ def test_every_walk_is_counted_and_told(lab):
     told = []
     result = lab.run(progress=told.append)
     first, *others = lab.status()
-    assert (first["walks"], first["message"]) == ("2", "1: Goes. 2: Comes.")
+    assert (first["walks"], first["message"]) == ("2", "Walk 0: Goes. Walk 1: Comes.")
     assert first["remarks"] == f"{lab.folder / 'v00.mp4'}: cut off; Walk 0: Look."
     assert [row["walks"] for row in others] == ["1", "0", ""] and not any(row["remarks"] for row in others)
     assert result.walks == 3
@@ -514,7 +514,7 @@ def test_every_walk_is_counted_and_told(lab):
     assert f"3 walks; several in 1 video (v00): {several}" in sentences
     assert "Remarks on 1 video (v00): see status.csv." in sentences
     line = next(_line(now.record) for now in told if now.record is not None and now.record.name == "v00")
-    assert ": done, 2 walks, " in line and line.endswith("1: Goes. 2: Comes. (remarks: status.csv)")
+    assert ": done, 2 walks, " in line and line.endswith("Walk 0: Goes. Walk 1: Comes. (remarks: status.csv)")
     rows = [(row["start_s"], row["end_s"]) for row in table(lab.out, "gait_parameters.csv")[:2]]
     assert rows == [("0.500", "2.250"), ("", "")]  # the second as an older memo left it
 

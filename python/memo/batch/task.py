@@ -205,7 +205,7 @@ def _told(said: str, complaints: str) -> tuple[int | None, str, list[str]]:
         messages = [walk["message"] for walk in summary["each_walk"]] or [summary["message"]]
         others = [line for line in summary["sentences"] if not line.endswith(tuple(messages))]
         several = len(messages) > 1
-        told = [f"{k}: {message}" if several else message for k, message in enumerate(messages, 1)]
+        told = [f"Walk {k}: {message}" if several else message for k, message in enumerate(messages)]
         return int(summary["walks"]), " ".join(told), complained + others
     except (ValueError, TypeError, KeyError):
         return None, "", complained
