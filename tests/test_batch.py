@@ -557,7 +557,7 @@ def test_a_changed_row_is_done_again_and_told(lab):
     assert lab.run(resume=True, overlay=True).done_now == 2
     lab.videos("ok")
     result = lab.run(resume=True, overlay=True)
-    assert any("no longer in the manifest (v01" in note for note in result.notes)
+    assert "1 video no longer in the manifest (v01): left unchanged." in result.notes
     assert (lab.out / "v01").is_dir() and len(lab.status()) == 1
 
 
@@ -799,6 +799,25 @@ def test_any_executor_will_do(lab):
     assert lab.results(lab.folder / "serial") == lab.results(lab.folder / "here")
 
 
+def test_a_lost_worker_is_told(lab):
+    class Losing(Executor):
+        lost = False
+
+        def submit(self, work, /, *arguments, **named):
+            future = Future()
+            if self.lost:
+                future.set_result(work(*arguments, **named))
+            else:
+                self.lost = True
+                future.set_exception(RuntimeError("the machine was switched off"))
+            return future
+
+    lab.videos("ok", "ok")
+    result = lab.run(executor=Losing())
+    assert set(lab.states().values()) == {"done"}
+    assert "1 worker was lost; its video was given to another." in result.notes
+
+
 def test_a_broken_pool_is_told_and_loses_nothing_for_good(lab):
     lab.videos("ok", f"kills-its-worker {lab.folder / 'killed'}", "sleeps 0.2", "ok", "ok")
     with ProcessPoolExecutor(2) as pool:
@@ -835,7 +854,7 @@ def test_a_ray_worker_that_is_killed_loses_its_video_alone(lab, monkeypatch):
         ray.shutdown()
     assert list(lab.states().values()) == ["done", "crashed", "done", "nobody", "crashed", "done"]
     assert "3 workers were lost with this video" in result.records[1].message
-    assert any("Workers were lost 4 times" in note for note in result.notes)
+    assert any("4 workers were lost; their videos were" in note for note in result.notes)
     assert not lab.processes() and not lab.strays()
 
 

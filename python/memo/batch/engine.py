@@ -287,10 +287,8 @@ def _notes(
         notes.append(f"{counted(len(changed), 'video')} changed since the last run and done again ({told}).")
     strange = set(folder.names()) - {row.name for row in manifest.rows}
     if strange:
-        example = min(strange)
-        notes.append(
-            f"{counted(len(strange), 'video')} no longer in the manifest ({example}, ...): left unchanged."
-        )
+        named = _named(sorted(strange))
+        notes.append(f"{counted(len(strange), 'video')} no longer in the manifest ({named}): left unchanged.")
     older = {record.memo for record in known.values() if record is not None} - {__version__}
     if older:
         notes.append(f"Some videos were tracked by memo {', '.join(sorted(older))}, not {__version__}.")
@@ -424,9 +422,9 @@ def _work(tasks: Sequence[Task], executor: Executor, folder: OutFolder, teller: 
     if broken is not None:
         notes.append(f"The executor failed: {broken} Resume to do the videos that are left.")
     if losses:
-        notes.append(
-            f"Workers were lost {counted(losses.total(), 'time')}; their videos were given to others."
-        )
+        one = "worker was lost; its video was given to another"
+        several = "workers were lost; their videos were given to others"
+        notes.append(f"{counted(losses.total(), one, several)}.")
     return notes
 
 
@@ -489,19 +487,18 @@ def described(result: BatchResult) -> Iterator[str]:
 
 def _of_walks(records: Sequence[Record]) -> Iterator[str]:
     """Reports the number of walks, if a video has several, and the number of remarks."""
-    several = [record for record in records if (record.walks or 0) > 1]
+    several = [record.name for record in records if (record.walks or 0) > 1]
     if several:
         walks = sum(record.walks or 0 for record in records)
         yield (
             f"{counted(walks, 'walk')}; several in {counted(len(several), 'video')} ({_named(several)}): "
             "gait_parameters.csv has one row per walk; its column person tells people of a video apart."
         )
-    remarked = [record for record in records if record.remarks]
+    remarked = [record.name for record in records if record.remarks]
     if remarked:
         yield f"Remarks on {counted(len(remarked), 'video')} ({_named(remarked)}): see status.csv."
 
 
-def _named(records: Sequence[Record]) -> str:
+def _named(names: Sequence[str]) -> str:
     """The first names, as examples."""
-    names = ", ".join(record.name for record in records[:_FEW])
-    return names + ", ..." * (len(records) > _FEW)
+    return ", ".join(names[:_FEW]) + ", ..." * (len(names) > _FEW)
