@@ -5,6 +5,7 @@ Most runs have a stand-in for `memo` as child, which does what its "video", a te
 """
 
 import csv
+import errno
 import json
 import os
 import random
@@ -20,7 +21,7 @@ from pathlib import Path
 
 import pytest
 from memo import batch
-from memo.batch import tables
+from memo.batch import engine, tables
 from memo.batch.engine import Progress, described
 from memo.batch.folder import OutFolder
 from memo.batch.manifest import Row
@@ -574,6 +575,49 @@ def test_results_that_were_removed_are_made_again(lab):
     lab.run()
     shutil.rmtree(lab.out / "v01")
     assert lab.run(resume=True).done_now == 1 and (lab.out / "v01" / "track.csv").is_file()
+
+
+def spoil(lab):
+    """Results of two videos that are of no use for the table of all."""
+    (lab.out / "v00" / "gait_parameters.csv").unlink()
+    file = lab.out / "v01" / "gait_parameters.csv"
+    file.write_text(file.read_text().replace(",", ";"))
+
+
+def test_unusable_results_of_a_video_do_not_affect_the_tables_of_others(lab):
+    lab.videos("ok", "ok")
+    lab.run()
+    spoil(lab)
+    lab.videos("ok", "ok", "ok")
+    result = lab.run(resume=True)
+    rows = table(lab.out, "gait_parameters.csv")
+    assert [(row["name"], row["state"], row["cadence_per_min"]) for row in rows] == [
+        *(("v00", "done", ""), ("v01", "done", ""), ("v02", "done", "1.7"))
+    ]
+    missing = f"{lab.out / 'v00' / 'gait_parameters.csv'}: No such file or directory"
+    assert (
+        f"2 videos without values in gait_parameters.csv (v00, v01): {missing}; "
+        "remove the folder of results and resume to track a video again." in result.notes
+    )
+
+
+@pytest.mark.parametrize("full", [False, True])
+def test_tables_that_cannot_be_written_do_not_hide_an_interrupt(lab, monkeypatch, full):
+    lab.videos("ok", "ok")
+    lab.run()
+    spoil(lab)
+    lab.videos("ok", "ok", "sleeps 60")
+
+    def interrupt(_):
+        if full:
+            monkeypatch.setattr(engine, "write_status", fill)
+        raise KeyboardInterrupt
+
+    def fill(*_):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    with pytest.raises(KeyboardInterrupt):
+        lab.run(resume=True, progress=interrupt)
 
 
 def test_bad_rows_can_be_skipped(lab):

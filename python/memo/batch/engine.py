@@ -153,8 +153,11 @@ def run(
             teller.tell()
             with ThreadPoolExecutor(jobs) if executor is None else contextlib.nullcontext(executor) as crew:
                 notes += _work(tasks, crew, folder, teller)
-        finally:
-            _write_tables(folder, read.rows, status_only=False)
+        except BaseException:
+            with contextlib.suppress(OSError):  # the first error is the one to report
+                _write_tables(folder, read.rows)
+            raise
+        notes += _write_tables(folder, read.rows)
     return _result(folder, mine, time.monotonic() - start, teller.told, notes)
 
 
@@ -365,7 +368,7 @@ class _Teller:
             self._counts[record.state] += 1
         now_s = time.monotonic()
         if now_s >= self._next_status_s:
-            _write_tables(self._folder, self._rows, status_only=True)
+            _write_status(self._folder, self._rows)
             took_s = time.monotonic() - now_s
             self._next_status_s = now_s + max(5.0, 50 * took_s)
         if self._progress is not None:
@@ -453,13 +456,23 @@ def _record_loss(task: Task, error: Exception) -> Record:
     return record
 
 
-def _write_tables(folder: OutFolder, rows: Sequence[Row], status_only: bool) -> None:
-    with folder.merging():
-        with folder.replaced(folder.out / "status.csv") as temporary:
-            write_status(folder, rows, temporary)
-        if not status_only:
-            with folder.replaced(folder.out / "gait_parameters.csv") as temporary:
-                write_table(folder, rows, temporary)
+def _write_status(folder: OutFolder, rows: Sequence[Row]) -> None:
+    with folder.merging(), folder.replaced(folder.out / "status.csv") as temporary:
+        write_status(folder, rows, temporary)
+
+
+def _write_tables(folder: OutFolder, rows: Sequence[Row]) -> list[str]:
+    """Writes both tables; returns a note on videos whose results cannot be read."""
+    _write_status(folder, rows)
+    with folder.merging(), folder.replaced(folder.out / "gait_parameters.csv") as temporary:
+        unreadable = write_table(folder, rows, temporary)
+    if not unreadable:
+        return []
+    names, reason = _named(list(unreadable)), next(iter(unreadable.values()))
+    return [
+        f"{counted(len(unreadable), 'video')} without values in gait_parameters.csv ({names}): {reason}; "
+        "remove the folder of results and resume to track a video again."
+    ]
 
 
 def described(result: BatchResult) -> Iterator[str]:

@@ -40,26 +40,36 @@ def write_status(folder: OutFolder, rows: Sequence[Row], path: Path) -> None:
     _write(path, STATUS_COLUMNS, cells)
 
 
-def write_table(folder: OutFolder, rows: Sequence[Row], path: Path) -> None:
+def write_table(folder: OutFolder, rows: Sequence[Row], path: Path) -> dict[str, str]:
     """Writes the `gait_parameters.csv` of all videos: one row per walk, or one for a video without walks.
 
     A parameter has columns such as `stride_time_right_s`, and with `_ci_low`, `_ci_high` (95 %) and `_n`.
+    Returns the videos whose results cannot be read, with the reason: their rows have name and state only.
     """
-    table = [walk for row in rows for walk in _walks(folder, row)]
+    table: list[dict[str, Any]] = []
+    unreadable: dict[str, str] = {}
+    for row in rows:
+        record = folder.record(row.name)
+        common = {"name": row.name, "state": "waiting" if record is None else record.state}
+        walks = [common]
+        if record is not None and record.finished:
+            try:
+                walks = _walks(folder.results(row.name), common)
+            except OSError as error:
+                unreadable[row.name] = f"{error.filename or folder.results(row.name)}: {error.strerror}"
+            except ValueError as error:
+                unreadable[row.name] = str(error)
+        table += walks
     parameters = dict.fromkeys(column for walk in table for column in walk if column not in _LEADING)
     header = (*_LEADING, *parameters)
     _write(path, header, ([walk.get(column, "") for column in header] for walk in table))
+    return unreadable
 
 
-def _walks(folder: OutFolder, row: Row) -> list[dict[str, Any]]:
+def _walks(results: Path, common: dict[str, Any]) -> list[dict[str, Any]]:
     """One dict per walk of the video, by column; one without a walk if it has none."""
-    record = folder.record(row.name)
-    state = "waiting" if record is None else record.state
-    if record is None or not record.finished:
-        return [{"name": row.name, "state": state}]
-    results = folder.results(row.name)
     given, seen = _run(results / "run.json")
-    common = {"name": row.name, "state": state, **given}
+    common = {**common, **given}
     walks: dict[str, dict[str, Any]] = {}
     lines = read_text_columns(results / "gait_parameters.csv", GAIT_COLUMNS, {"person": "walk"})
     for walk, person, parameter, side, value, unit, low, high, n in zip(*lines.values(), strict=True):
