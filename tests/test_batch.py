@@ -677,6 +677,41 @@ def test_no_input_is_where_results_go(lab):
     assert "is where results go" in checked.stderr
 
 
+@pytest.mark.parametrize("kind", ["folder", "file", "link to results", "link to nothing"])
+def test_nothing_but_results_is_replaced_by_results(lab, kind):
+    lab.videos("ok", "ok")
+    lab.run()
+    place, elsewhere = lab.out / "v01", lab.folder / "elsewhere"
+    place.rename(elsewhere)
+    if kind == "folder":
+        place.mkdir()
+        (place / "diary.txt").write_text("precious")
+    elif kind == "file":
+        place.write_text("precious")
+    else:
+        place.symlink_to(elsewhere if kind == "link to results" else lab.folder / "nowhere")
+    lab.videos("ok", "ok", "ok", heights=[1.6, 1.8, 1.7])
+    before = {path: path.read_bytes() for path in lab.folder.rglob("*.*") if path.is_file()}
+    told = rf"walks.csv, line 3: {place}: is not a folder of results of memo and would be replaced; move it"
+    with pytest.raises(batch.ManifestError, match=told):
+        lab.run(resume=True)
+    assert {path: path.read_bytes() for path in lab.folder.rglob("*.*") if path.is_file()} == before
+    checked = subprocess.run(
+        memo_command(lab.manifest, "--check", "--out", lab.out), capture_output=True, text=True
+    )
+    assert checked.returncode == 1 and re.search(told, checked.stderr)
+    place.rename(lab.folder / "moved")
+    assert lab.run(resume=True).done_now == 3 and set(lab.states().values()) == {"done"}
+
+
+def test_results_without_a_record_are_made_again(lab):
+    lab.videos("ok", "ok")
+    lab.run()
+    (lab.out / ".batch" / "records" / "v01.json").unlink()  # as if killed after the folder was placed
+    assert lab.run(resume=True).done_now == 1 and set(lab.states().values()) == {"done"}
+    assert not lab.strays()
+
+
 def test_a_disk_that_fills_up_stops_the_run_and_not_the_videos(lab, monkeypatch):
     lab.videos("ok", "fails", "ok", "ok")
     usage, full = shutil.disk_usage("/"), lab.out / "v00"

@@ -138,7 +138,8 @@ def run(
     with folder.taken() as name:
         known = _known(mine, folder, out, resume)
         fingerprints = {row.name: row.fingerprint for row in mine}
-        to_do = [row for row in mine if _is_to_do(known[row.name], fingerprints[row.name], retry_failed)]
+        to_do = [row for row in mine if is_to_do(known[row.name], fingerprints[row.name], retry_failed)]
+        check_places(folder, to_do)
         notes = _notes(read, folder, known, to_do, fingerprints)
         _record_problems(folder, to_do)
         processors = _processors()
@@ -249,7 +250,8 @@ def _check_numbers(
         raise BatchError(f"a memory limit of {memory_mb} MB is too small")
 
 
-def _is_to_do(record: Record | None, fingerprint: dict[str, Any], retry_failed: bool) -> bool:
+def is_to_do(record: Record | None, fingerprint: dict[str, Any], retry_failed: bool = False) -> bool:
+    """Whether a resumed run does a video, given the record of an earlier run."""
     if record is None or record.fingerprint != fingerprint:
         return True
     return retry_failed and not record.finished
@@ -307,6 +309,18 @@ def check_inputs(out: Path, rows: Sequence[Row]) -> None:
             lies_in = [file.resolve(), *file.resolve().parents]
             if place := next((place for place in lies_in if place in places), None):
                 problems.append(f"{row.place}: {file}: is where results go ({place}); give another folder")
+    if problems:
+        raise ManifestError(problems)
+
+
+def check_places(folder: OutFolder, to_do: Sequence[Row]) -> None:
+    """Refuses rows whose results would replace anything else."""
+    problems = []
+    for row in to_do:
+        try:
+            folder.check_place(row.name)
+        except BatchError as error:
+            problems.append(f"{row.place}: {error}")
     if problems:
         raise ManifestError(problems)
 

@@ -28,6 +28,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from memo.run import NAME as RUN
 from memo.unfinished import complete_file, new_folder
 
 __all__ = ["STATES", "BatchError", "OutFolder", "Record", "check_ours"]
@@ -124,15 +125,32 @@ class OutFolder:
     def forget(self, name: str) -> None:
         """Removes a video's record, then its results: results without a record do not count."""
         self._record_file(name).unlink(missing_ok=True)
-        _remove(self.results(name))
+        self._remove_results(name)
 
     def place(self, finished: Path, name: str) -> None:
         """Gives a finished folder its final name."""
         for file in [*finished.rglob("*"), finished]:
             _settle(file)
-        _remove(self.results(name))
+        self._remove_results(name)
         os.replace(finished, self.results(name))
         _settle(self.out)
+
+    def check_place(self, name: str) -> None:
+        """Refuses to replace anything that is not a folder of results."""
+        place = self.results(name)
+        if place.is_symlink() or (place.exists() and not (place / RUN).is_file()):
+            raise BatchError(
+                f"{place}: is not a folder of results of memo and would be replaced; "
+                "move it, or give the row another name"
+            )
+
+    def _remove_results(self, name: str) -> None:
+        """Removes a folder of results as a whole: a killed process leaves nothing of it in place."""
+        self.check_place(name)
+        if self.results(name).exists():
+            unfinished = self.unfinished()
+            os.replace(self.results(name), unfinished / "results")
+            shutil.rmtree(unfinished)
 
     @contextlib.contextmanager
     def replaced(self, path: Path) -> Iterator[Path]:
@@ -272,11 +290,6 @@ def _settle(path: Path) -> None:
         os.fsync(descriptor)
     finally:
         os.close(descriptor)
-
-
-def _remove(folder: Path) -> None:
-    if folder.is_dir() and not folder.is_symlink():
-        shutil.rmtree(folder)
 
 
 def _empty(work: Path) -> None:

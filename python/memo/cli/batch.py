@@ -16,7 +16,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from memo.batch import OPTIONS, BatchResult, ManifestError, Progress, RayExecutor, Record, run
-from memo.batch.engine import check_folder, check_inputs, default_out, described, notes_on, prepared
+from memo.batch.engine import (
+    check_folder,
+    check_inputs,
+    check_places,
+    default_out,
+    described,
+    is_to_do,
+    notes_on,
+    prepared,
+)
+from memo.batch.folder import OutFolder
 from memo.cli.delivery import Delivery, complain, guarded, terminal
 from memo.exits import Exit
 from memo.given import InputError
@@ -142,6 +152,8 @@ def _check(manifest: Path, delivery: Delivery) -> Exit:
     read = prepared(manifest, overlay=delivery.overlay, plots=delivery.plots)
     check_inputs(delivery.out, read.rows)
     check_folder(delivery.out, read.rows)
+    folder = OutFolder(delivery.out)
+    check_places(folder, [row for row in read.rows if is_to_do(folder.record(row.name), row.fingerprint)])
     if delivery.as_json:
         print(json.dumps({"videos": len(read.rows), "names": [row.name for row in read.rows]}))
     elif delivery.talks:
