@@ -438,6 +438,20 @@ def test_names_follow_from_paths_and_differ(tmp_path):
         )
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems have no such file names")
+def test_a_file_name_that_is_not_text_needs_a_name(lab):
+    video = os.fsdecode(os.fsencode(lab.folder) + b"/gr\xfc\xdfe.mp4")
+    Path(video).write_text("ok")
+    lab.videos("ok")
+    rows = [{"video": lab.folder / "v00.mp4"}, {"video": video}]
+    (problem,) = problems_of(rows)
+    assert problem.startswith(r"row 2: 'gr\udcfc\udcdfe' cannot be the name of a folder here; give another")
+    rows[1]["name"] = "greetings"
+    batch.run(rows, lab.out, command=lab.command)
+    assert lab.states() == {"v00": "done", "greetings": "done"}
+    assert lab.status()[1]["video"].endswith(r"gr\udcfc\udcdfe.mp4")
+
+
 CAMERA = """
 [side]
 name = "side"

@@ -385,7 +385,7 @@ def _name_problems(rows: list[Row]) -> list[str]:
     alike = defaultdict(list)
     for row in rows:
         alike[row.name.casefold()].append(row)
-        unfit = re.search(r"[/\\:*?\"<>|\x00-\x1f]", row.name) or row.name.startswith(".")
+        unfit = re.search(r"[/\\:*?\"<>|\x00-\x1f\ud800-\udfff]", row.name) or row.name.startswith(".")
         if unfit or row.name.casefold() in TAKEN or not 0 < len(row.name.encode()) <= _LONGEST_NAME:
             problems.append(
                 f"{row.place}: {row.name!r} cannot be the name of a folder here; give another name"

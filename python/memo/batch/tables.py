@@ -118,5 +118,6 @@ def _seconds(value: float | None) -> str:
 
 
 def _write(path: Path, header: Iterable[str], rows: Iterable[Iterable[Any]]) -> None:
-    with open(path, "w", newline="", encoding="utf-8") as file:
+    # A file name that is not UTF-8 is written as Python escapes it.
+    with open(path, "w", newline="", encoding="utf-8", errors="backslashreplace") as file:
         write_rows(file, chain([header], rows))
