@@ -210,6 +210,22 @@ def test_names_of_videos_are_no_formulas_in_the_tables(lab):
     assert [row.name for row in batch.read_manifest(lab.manifest).rows] == names
 
 
+def test_names_that_look_like_numbers_are_kept_by_pandas(lab):
+    pandas = pytest.importorskip("pandas")
+    page = Path(__file__).parents[1] / "docs" / "reference" / "files.md"
+    (options,) = re.findall(r"`(dtype=.*, na_values=.*)`", page.read_text(encoding="utf-8"))
+    lab.videos("ok")
+    batch.run(
+        [{"video": lab.folder / "v00.mp4", "name": name} for name in ("001", "NA")],
+        lab.out,
+        command=lab.command,
+    )
+    for file in ("status.csv", "gait_parameters.csv"):
+        read = eval(f"read_csv(path, {options})", {"read_csv": pandas.read_csv, "path": lab.out / file})
+        assert list(read["name"]) == ["001", "NA"]
+    assert read["p_swapped"].dtype == float and read["person"].isna().sum() == 0
+
+
 def test_csv_and_toml_say_the_same(tmp_path):
     for name in ("a.mp4", "b.mp4", "side.toml"):
         (tmp_path / name).write_text("x")

@@ -44,7 +44,7 @@ NOT_RUN = {
     "docs/methods/point-light-displays.md": 1,
     "docs/start/keypoints-from.md": 1,
 }
-BLOCKS_RUN = 34
+BLOCKS_RUN = 35
 
 _FENCE = re.compile(
     r"^(?P<ticks>```+)(?P<language>[^\n`]*)\n(?P<text>.*?)^(?P=ticks)$", re.MULTILINE | re.DOTALL
