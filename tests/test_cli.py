@@ -4,6 +4,7 @@ import dataclasses
 import json
 import os
 import shlex
+import shutil
 import signal
 import subprocess
 import sys
@@ -28,6 +29,7 @@ from memo.files import (
     write_events_csv,
     write_track_csv,
 )
+from memo.given import default_out
 from memo.run import read_run
 
 TESTS = Path(__file__).parent
@@ -139,6 +141,40 @@ def test_results_go_to_memo_out_by_default(memo_command, video, tmp_path, monkey
     monkeypatch.chdir(tmp_path)
     assert memo_command("track", video, "--no-overlay", "--no-plots")[0] == 0
     assert {path.name for path in (tmp_path / "memo-out" / "walk").iterdir()} == TABLES
+
+
+def test_results_of_another_video_are_not_replaced_unasked(memo_command, video, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    out, plain = Path("memo-out/walk"), ("--no-overlay", "--no-plots")
+    other = tmp_path / "p2" / "walk.mp4"
+    other.parent.mkdir()
+    shutil.copy(video, other)
+    (tmp_path / "link").symlink_to(video.parent)
+    assert memo_command("track", video, *plain)[0] == 0
+    for same in (video, Path("link") / "walk.mp4"):
+        assert memo_command("track", same, "--height", "1.8", *plain)[0] == 0
+    before = (out / "run.json").read_bytes()
+    code, _, complaint = memo_command("track", other, *plain)
+    latest = tmp_path / "link" / "walk.mp4"
+    assert (code, complaint) == (
+        1,
+        f"memo: {out}: holds the results of {latest}; give another folder with --out\n",
+    )
+    assert (out / "run.json").read_bytes() == before
+    assert memo_command("track", other, "--out", out, *plain)[0] == 0
+    (out / ".batch").mkdir()
+    code, _, complaint = memo_command("track", other, *plain)
+    assert (code, complaint) == (
+        1,
+        f"memo: {out}: holds the results of memo batch; give another folder with --out\n",
+    )
+
+
+def test_the_default_folder_of_images_has_the_whole_name(tmp_path):
+    (tmp_path / "s01.t1").mkdir()
+    (tmp_path / "s01.mp4").touch()
+    assert default_out(tmp_path / "s01.t1") == Path("memo-out/s01.t1")
+    assert default_out(tmp_path / "s01.mp4") == default_out(tmp_path / "s01.avi") == Path("memo-out/s01")
 
 
 @pytest.mark.parametrize("source", [".", "..", "../walk", "link"])

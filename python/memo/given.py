@@ -16,11 +16,14 @@ from pathlib import Path
 from typing import Any
 
 import memo
+from memo.run import NAME as RUN
+from memo.run import read_run
 
 __all__ = [
     "InputError",
     "UsageError",
     "check_apart",
+    "check_default_out",
     "check_writable",
     "checked_fov",
     "checked_height",
@@ -191,7 +194,20 @@ def check_apart(read: Iterable[Path | None], written: Iterable[Path]) -> None:
 
 def default_out(source: Path) -> Path:
     """The folder for the results of a source, named like it; also `.` and `..` have a name."""
-    return Path("memo-out") / Path(os.path.abspath(source)).stem
+    path = Path(os.path.abspath(source))
+    return Path("memo-out") / (path.name if path.is_dir() else path.stem)
+
+
+def check_default_out(out: Path, video: Path) -> None:
+    """Refuses to replace results of another video, or of a batch, in a folder that the user did not name."""
+    if (out / ".batch").exists():
+        raise InputError(f"{out}: holds the results of memo batch; give another folder with --out")
+    if (out / RUN).is_file():
+        other = read_run(out)["video"]
+        if other is None or Path(other).resolve() != video.resolve():
+            raise InputError(
+                f"{out}: holds the results of {other or 'drawn frames'}; give another folder with --out"
+            )
 
 
 _LEAST_FREE_BYTES = 4 << 20  # tables and pictures of a short video

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from memo.cli.delivery import Delivery, Interrupt, complain, guarded, with_steps
 from memo.exits import Exit
-from memo.given import default_out, frame_range, heights, point_in_frame, tracker_options
+from memo.given import check_default_out, default_out, frame_range, heights, point_in_frame, tracker_options
 from memo.recording import Point, Recorded, Recording, track_recording
 
 if TYPE_CHECKING:
@@ -113,6 +113,8 @@ def add_track(app: "typer.Typer") -> None:
         delivery = Delivery(out or default_out(video), overlay, plots, as_json, quiet)
 
         def work() -> Exit:
+            if out is None:
+                check_default_out(delivery.out, video)
             reading = {"name": camera_name, "unit": camera_unit, "size": camera_size, "v_up": camera_v_up}
             options = tracker_options(heights(height), camera, reading, fov_deg, steady, treadmill)
             asked = frame_range(frames)
