@@ -375,9 +375,10 @@ fn windows(times_s: &[f64], window_s: f64) -> Vec<(usize, usize)> {
     let mut intervals_s: Vec<f64> = times_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let middle = intervals_s.len() / 2;
     let usual_s = *intervals_s.select_nth_unstable_by(middle, f64::total_cmp).1;
-    let long = ((window_s / usual_s).round().clamp(0.0, 1e9) as usize).max(FEWEST_FRAMES);
+    // Where times of frames are rounded decides nothing.
+    let long = ((window_s / usual_s + 1e-6).round().clamp(0.0, 1e9) as usize).max(FEWEST_FRAMES);
     // No window contains a pause.
-    let pause_s = (MISSED_FRAMES * usual_s).max(PAUSE_OF_WINDOW * window_s);
+    let pause_s = (1.0 + 1e-6) * (MISSED_FRAMES * usual_s).max(PAUSE_OF_WINDOW * window_s);
     let after_pause = (1..frames).filter(|&t| times_s[t] - times_s[t - 1] > pause_s);
     let bounds: Vec<usize> = std::iter::once(0).chain(after_pause).chain([frames]).collect();
     let stretches = bounds.windows(2).map(|pair| (pair[0], pair[1]));
@@ -421,6 +422,12 @@ mod tests {
         let found = windows(&times_s, 1.2);
         assert!(found.iter().all(|&(start, end)| end <= 70 || start >= 70), "{found:?}");
         assert!(found.contains(&(0, 70)) && found.last().unwrap().1 == 150);
+        // How times are rounded does not decide: ten frames per second, of which four are missing.
+        let from = |start_s: f64| {
+            let times_s: Vec<f64> = (0..40).map(|t| start_s + 0.1 * f64::from(t + 4 * (t / 20))).collect();
+            [1.0, 1.25].map(|window_s| windows(&times_s, window_s))
+        };
+        assert!([0.1, 0.3, 7.7, 100.0].iter().all(|&start_s| from(start_s) == from(0.0)));
         let scattered: Vec<f64> = (0..12).map(|t| f64::from(t) / 60.0 + 5.0 * f64::from(t / 3)).collect();
         assert!(windows(&scattered, 1.2).is_empty());
         let (tracks, ..) = walker(12, |_| 0.0, 0.0);

@@ -24,8 +24,8 @@ const ADVANCES: [usize; 2] = [4, 24];
 /// Cost of a change of the advance by one, nats.
 const CHANGE_NATS: f64 = 0.5;
 
-/// A longer gap begins a new path, seconds.
-const GAP_S: f64 = 0.5;
+/// A longer gap begins a new path, seconds, whatever times of frames are rounded to.
+const GAP_S: f64 = 0.5 + 1e-6;
 
 /// Swings of upper arm, forearm, thigh and shank over the right side's cycle.
 type Curves = Vec<[f64; 4]>;
@@ -34,7 +34,7 @@ type Curves = Vec<[f64; 4]>;
 pub(super) struct Cycle {
     curves: Curves,
     /// Phase of every frame, 0 to [`PHASES`].
-    phase: Vec<usize>,
+    phase: Vec<f64>,
 }
 
 impl Cycle {
@@ -54,24 +54,28 @@ impl Cycle {
             let from = phase.len();
             let next = (from + 1..times_s.len()).find(|&t| times_s[t] - times_s[t - 1] > GAP_S);
             let to = next.unwrap_or(times_s.len());
-            // 1. Costs of every phase, in steps of equal time.
-            let step_of = |t: usize| ((times_s[t] - times_s[from]) / STEP_S).round() as usize;
-            let mut costs = vec![[0.0; PHASES]; step_of(to - 1) + 1];
+            // 1. Costs of every phase, in steps of equal time, between which each frame is shared.
+            let between = |t: usize| {
+                let steps = (times_s[t] - times_s[from]) / STEP_S;
+                (steps as usize, steps.fract())
+            };
+            let mut costs = vec![[0.0; PHASES]; between(to - 1).0 + 2];
             for t in from..to {
-                let step = &mut costs[step_of(t)];
-                step.iter_mut()
-                    .enumerate()
-                    .for_each(|(k, cost)| *cost += phase_cost(problem, limbs, &curves, t, k));
+                let (step, later) = between(t);
+                let [before, after] = &mut costs[step..].first_chunk_mut::<2>().expect("a step after it");
+                for (k, (before, after)) in before.iter_mut().zip(after).enumerate() {
+                    let cost = phase_cost(problem, limbs, &curves, t, k);
+                    *before += (1.0 - later) * cost;
+                    *after += later * cost;
+                }
             }
             // 2. The path of least cost.
             let path = path(&costs);
             // 3. The phase of each frame, by its time between two steps.
             phase.extend((from..to).map(|t| {
-                let steps = (times_s[t] - times_s[from]) / STEP_S;
-                let before = (steps as usize).min(path.len() - 1);
-                let after = (before + 1).min(path.len() - 1);
-                let advance = (path[after] + PHASES - path[before]) % PHASES;
-                (path[before] + (advance as f64 * steps.fract()).round() as usize) % PHASES
+                let (step, later) = between(t);
+                let advance = (path[step + 1] + PHASES - path[step]) % PHASES;
+                (path[step] as f64 + advance as f64 * later) % PHASES as f64
             }));
         }
         Some(Self { curves, phase })
@@ -79,7 +83,9 @@ impl Cycle {
 
     /// Average swings of inner and outer segment of a limb in a frame; pair 0 is the arms.
     pub fn swings(&self, t: usize, pair: usize, side: usize) -> [f64; 2] {
-        swings(&self.curves, self.phase[t], pair, side)
+        let (before, later) = (self.phase[t] as usize, self.phase[t].fract());
+        let [before, after] = [before, before + 1].map(|phase| swings(&self.curves, phase, pair, side));
+        [0, 1].map(|segment| before[segment] + later * (after[segment] - before[segment]))
     }
 }
 
@@ -251,6 +257,22 @@ mod tests {
     }
 
     /// Any motion has no phase.
+    /// At 25 frames per second, every second frame is in the middle between two steps.
+    #[test]
+    fn how_times_are_rounded_does_not_decide() {
+        let (_, frames, lengths, options) = sequence(0.5);
+        let swings = |stretched: f64| {
+            let mut frames = frames.clone();
+            let times = (0..frames.len()).map(|t| 0.04 * t as f64 * stretched);
+            frames.iter_mut().zip(times).for_each(|(frame, time_s)| frame.time_s = time_s);
+            let cycle = cycle_of(&frames, &lengths, &options).unwrap();
+            (0..frames.len()).flat_map(|t| cycle.swings(t, 1, 0)).collect::<Vec<_>>()
+        };
+        for (longer, shorter) in swings(1.0 + 1e-12).into_iter().zip(swings(1.0 - 1e-12)) {
+            assert!((longer - shorter).abs() < 1e-6, "{longer} {shorter}");
+        }
+    }
+
     #[test]
     fn only_walks_have_a_phase() {
         let (_, frames, lengths, options) = sequence(0.0);

@@ -39,7 +39,7 @@ const ROBUST_SIGMAS: f64 = 4.0;
 /// The accelerations are those of frames this far apart, seconds.
 const ACCELERATION_STEP_S: f64 = 1.0 / 30.0;
 /// Frames farther apart are not smoothed together, seconds.
-const LONGEST_STEP_S: f64 = 0.25;
+const LONGEST_STEP_S: f64 = 0.25 + 1e-6;
 
 /// The motion that starts at `start`, smoothed in space; camera axes, metres. Joints that `start` does not have
 /// stay unknown.

@@ -36,7 +36,7 @@ const ANKLE_SD_M: f64 = 0.01;
 const TURN_RAD_PER_S: f64 = 8.0;
 const TURN_RAD: f64 = 0.15;
 /// Frames farther apart are not compared, seconds.
-const LONGEST_STEP_S: f64 = 0.25;
+const LONGEST_STEP_S: f64 = 0.25 + 1e-6;
 /// A cost of one frame is at most this, nats.
 const CAP: f64 = 8.0;
 

@@ -159,12 +159,13 @@ impl Problem<'_> {
             .map(|distance| {
                 let [a, b] = distance.joints();
                 let between = figure[b] - figure[a];
-                let along = between.normalize_or_zero().dot(self.ray(t, b));
+                let unit = between.normalize_or_zero();
+                let [sd_a, sd_b] = [a, b].map(|joint| unit.dot(self.ray(t, joint)) * sd_m[joint]);
                 let sd = self
                     .options
                     .prior
                     .rigid_m
-                    .hypot(along * sd_m[a].hypot(sd_m[b]))
+                    .hypot(sd_a.hypot(sd_b))
                     .hypot(std::f64::consts::SQRT_2 * lateral_m);
                 chi_sq((between.length() - self.lengths.rigid[distance as usize]) / sd)
             })
@@ -190,7 +191,9 @@ impl Problem<'_> {
         ] {
             let line = figure[left] - figure[right];
             let turn = axes.x_axis.dot(line).atan2(axes.z_axis.dot(line));
-            cost += usual(soft, turn, line, sd_m[right].hypot(sd_m[left]), axes.x_axis, left);
+            let [sd_right, sd_left] =
+                [right, left].map(|joint| axes.x_axis.dot(self.ray(t, joint)) * sd_m[joint]);
+            cost += soft.cost(turn, sd_right.hypot(sd_left) / line.length());
         }
         let [right, left] = [Joint::RightShoulder, Joint::LeftShoulder];
         let forward = axes.x_axis.dot(figure[Joint::Neck] - 0.5 * (figure[right] + figure[left]));
