@@ -832,3 +832,19 @@ def test_what_is_undecided_does_not_depend_on_rounding(scene):
     assert (as_given.gap_m > 0).sum() > 20
     np.testing.assert_allclose(nearly.p_mirrored, as_given.p_mirrored, atol=1e-4)
     np.testing.assert_array_equal(nearly.undecided_joints, as_given.undecided_joints)
+
+
+def test_a_frame_is_undecided_if_a_joint_in_it_is(scene, tmp_path, memo_posture):
+    """In the object, the sentence, the document and the page, as in the table."""
+    folder, truth = scene
+    noise = np.random.default_rng(3).normal(0, 3.0, (*truth.shape[:2], 2))
+    path = write_table(tmp_path / "noisy.csv", truth, change=lambda pixels: pixels + noise)
+    arguments = [path, "--camera", folder / "camera.toml", "--fps", RATE_HZ, "--noise-px", 3]
+    code, said, _ = memo_posture(*arguments, "--height", 1.75, "--no-plots", "--out", tmp_path / "out")
+    rows, _ = read_table(tmp_path / "out" / "postures.csv")
+    frames = sum(any(float(row[f"{name}_p_mirrored"] or 0) > 0.2 for name in JOINTS) for row in rows)
+    assert code == 0 and 0 < frames < FRAMES
+    assert f"at least one joint is undecided in {frames} of {FRAMES} frames" in said
+    assert json.loads((tmp_path / "out" / "postures.json").read_text())["undecided_frames"] == frames
+    page = write_report(tmp_path / "out").path.read_text()
+    assert f"Some joint is undecided in {frames} of {FRAMES} frames" in " ".join(page.split())

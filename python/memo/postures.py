@@ -45,7 +45,6 @@ _DISTANCES_M = (0.1, 1000.0)
 _MOST_GROUPS = 1 << 31
 
 _UNDECIDED_P = 0.2
-_UNDECIDED_NATS = math.log(1 / _UNDECIDED_P - 1)
 
 Array = npt.NDArray[np.float64]
 Whole = npt.NDArray[np.int64]
@@ -224,9 +223,8 @@ class Postures(Shown):
 
     @property
     def undecided(self) -> npt.NDArray[np.bool_]:
-        """(T,) whether another motion has a probability over 0.2. For other motions than walking one often
-        has; `undecided_joints` says which joints differ."""
-        return np.asarray(self.found & (self.margin_nats < _UNDECIDED_NATS), np.bool_)
+        """(T,) whether at least one joint is undecided; `undecided_joints` says which."""
+        return np.asarray(self.undecided_joints.any(axis=1), np.bool_)
 
     @property
     def undecided_joints(self) -> npt.NDArray[np.bool_]:
