@@ -74,7 +74,9 @@ def test_an_exchange_that_is_a_guess_is_called_one(confused, tmp_path, memo_unsw
     assert {row["verdict"] for row in repair.flips} == {"guessed", "undecided"}
     assert repair.p_global["legs"] == pytest.approx(0.5, abs=0.1)
     code, out, _ = memo_unswap(path, "--fps", 25, "--out", tmp_path / "out")
-    assert code == 0 and "legs in 0" in out and "by the best guess: legs in 30" in out
+    undecided = f"undecided: legs in {repair.undecided['legs']}"
+    said = f"legs in 30 of 60 frames (of these only by the best guess: legs in 30; {undecided})."
+    assert code == 0 and f"Exchanged right and left: {said}" in out
     assert "most frames are labelled correctly" in out
 
 

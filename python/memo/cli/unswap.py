@@ -141,12 +141,14 @@ def _shown(someone: Someone) -> str:
 
 
 def exchanges(repair: memo.SideRepair) -> str:
-    """Describes in how many frames the sides were exchanged and in how many they are undecided."""
-    done = f"{_by_group(repair.exchanged)} of {counted(len(repair.keypoints.frames), 'frame')}"
+    """Describes in how many frames the sides were exchanged, in how many of these only by the best guess,
+    and in how many they are undecided."""
+    total = {group: frames + repair.guessed[group] for group, frames in repair.exchanged.items()}
+    done = f"{_by_group(total)} of {counted(len(repair.keypoints.frames), 'frame')}"
     doubt = _by_group({group: frames for group, frames in repair.undecided.items() if frames})
     guessed = _by_group({group: frames for group, frames in repair.guessed.items() if frames})
-    doubt += f", exchanged by the best guess: {guessed}" if guessed else ""
-    return f"{done} ({f'undecided: {doubt}' if doubt else 'none undecided'})"
+    guess = f"of these only by the best guess: {guessed}; " if guessed else ""
+    return f"{done} ({guess}{f'undecided: {doubt}' if doubt else 'none undecided'})"
 
 
 def _by_group(frames: dict[str, int]) -> str:
