@@ -74,6 +74,25 @@ def test_a_track_is_written_in_every_format(tmp_path, memo_command):
     ]
 
 
+def test_tables_keep_the_frame_numbers_of_the_input(tmp_path, memo_command):
+    write_track(tmp_path / "run")
+
+    def frames(source, *options):
+        target = tmp_path / "again.csv"
+        assert memo_command("convert", source, target, *options)[0] == 0
+        with target.open(newline="") as file:
+            return [int(row["frame"]) for row in csv.DictReader(file)]
+
+    assert frames(tmp_path / "run") == FRAMES.tolist()
+    assert frames(tmp_path / "run", "--walk", 1) == [*range(50, 75)]
+    (tmp_path / "again.csv").rename(tmp_path / "table.csv")
+    assert frames(tmp_path / "table.csv") == [*range(50, 75)]
+    assert memo_command("convert", tmp_path / "run", tmp_path / "walk.c3d", "--quiet")[0] == 0
+    assert frames(tmp_path / "walk.c3d") == [*range(10, 75)]
+    resampled = frames(tmp_path / "run", "--rate", 50)
+    assert resampled == [*range(len(resampled))], "these are not frames of the video"
+
+
 def test_joints_get_the_names_of_pose2sim_and_keep_their_places(tmp_path, memo_command):
     points = write_track(tmp_path / "run")
     target = tmp_path / "walk.trc"
@@ -122,6 +141,10 @@ def test_clinical_hips_are_against_the_pelvis(tmp_path, memo_command):
     for name in ("right_hip", "left_hip"):
         np.testing.assert_allclose(raised.angles[name], plain.angles[name] + 11.4)
     np.testing.assert_allclose(raised.angles["right_knee"], plain.angles["right_knee"])
+    for ending in (".trc", ".bvh"):
+        code, said, err = memo_command("convert", tmp_path / "run", tmp_path / f"b{ending}", "--clinical")
+        wanted = f"memo: --clinical: has no meaning for {ending} files, which hold no joint angles"
+        assert (code, said, err) == (1, "", wanted)
     code, _, err = memo_command("convert", target, tmp_path / "b.mot", "--clinical")
     assert code == 1 and "need a folder of `memo track`" in err
 
@@ -261,6 +284,13 @@ def test_irregular_stamps_are_refused_and_interpolated_on_demand(tmp_path, memo_
         assert not target.exists()
         assert memo_command("convert", tmp_path / "run", target, "--rate", 50, "--quiet") == (0, "", "")
         assert read_motion(target).at_constant_rate()[0] == pytest.approx(50)
+    span_s = times_s[-1] - times_s[0]
+    said = memo_command("convert", tmp_path / "run", tmp_path / "walk.trc", "--rate", 50)[1]
+    assert said.startswith("Read 55 frames, 12 points, 10 joint angles, 2 events, ")
+    assert f"Interpolated linearly to 50 Hz: {int(span_s * 50) + 1} frames." in said
+    said = memo_command("convert", tmp_path / "run", tmp_path / "walk.trc", "--rate", 50, "--json")[1]
+    summary = json.loads(said)
+    assert (summary["frames"], summary["last_s"]) == (55, pytest.approx(times_s[-1], abs=1e-6))
     assert memo_command("convert", tmp_path / "run", tmp_path / "walk.csv")[0] == 0
     assert read_motion(tmp_path / "walk.csv").times_s == pytest.approx(times_s, abs=1e-6)
 
@@ -276,6 +306,11 @@ def test_postures_are_converted_with_short_gaps_filled(tmp_path, memo_command):
     write_columns_csv(tmp_path / "run" / "postures.csv", columns)
     target = tmp_path / "postures.bvh"
     assert memo_command("convert", tmp_path / "run", target)[0] == 1
+    (tmp_path / "run" / "postures.json").write_text("{}")
+    wanted = f"memo: {tmp_path / 'run'}: a folder of `memo posture` holds joints in space, and no keypoints"
+    for keypoints in ("a.json", "a_json"):
+        code, said, err = memo_command("convert", tmp_path / "run", tmp_path / keypoints)
+        assert (code, said, err) == (1, "", wanted)
     code, out, _ = memo_command("convert", tmp_path / "run", target, "--fill", 0.1)
     assert code == 0 and "Interpolated linearly: 2 missing values." in out
     assert read_motion(target).metadata["up"] == "y"

@@ -125,6 +125,9 @@ def add_convert(app: "typer.Typer") -> None:
         raise typer.Exit(guarded(work))
 
 
+_WITHOUT_ANGLES = (".bvh", ".trc")
+
+
 def _convert(
     source: Path,
     target: Path,
@@ -142,13 +145,15 @@ def _convert(
         raise InputError(f"{target}: the ending must be one of {endings}")
     if target.is_dir():
         raise InputError(f"{target}: is a folder")
+    if writing[2] and target.suffix.lower() in _WITHOUT_ANGLES:
+        raise InputError(f"--clinical: has no meaning for {target.suffix} files, which hold no joint angles")
     if not source.exists():
         raise InputError(nothing_at(source, "file or folder"))
     check_writable(target.parent)
     check_apart(sources(source) if source.is_dir() else [source], [target])
     with with_elapsed("converting", delivery):
         up, names, is_clinical = writing
-        motion = read_motion(source, **reading)
+        motion = read = read_motion(source, **reading)
         if is_clinical:
             motion = clinical(motion)
         notes = [*motion.notes]
@@ -157,18 +162,19 @@ def _convert(
             notes.append(f"Interpolated linearly: {counted(filled, 'missing value')}.")
         if rate_hz is not None:
             motion = motion.resampled(rate_hz)
+            notes.append(f"Interpolated linearly to {rate_hz:g} Hz: {counted(len(motion.times_s), 'frame')}.")
         target_up = usual_up(target) if up is None else up.value
         notes += write_motion(target, motion, target_up, names=None if names is None else names.value)
     summary = {
         "source": str(source),
         "target": str(target),
-        "frames": len(motion.times_s),
-        "first_s": float(motion.times_s[0]),
-        "last_s": float(motion.times_s[-1]),
-        "points": list(motion.names),
-        "missing": float(np.isnan(motion.points[..., 0]).mean()) if motion.names else 0.0,
-        "angles": list(motion.angles),
-        "events": len(motion.events),
+        "frames": len(read.times_s),
+        "first_s": float(read.times_s[0]),
+        "last_s": float(read.times_s[-1]),
+        "points": list(read.names),
+        "missing": float(np.isnan(read.points[..., 0]).mean()) if read.names else 0.0,
+        "angles": list(read.angles),
+        "events": len(read.events),
         "up": target_up,
         "notes": notes,
     }

@@ -128,7 +128,8 @@ def read_c3d(path: Path, given: Given) -> Motion:
         ),
     ]
     metadata = {"format": "c3d", "up": up, "unit": unit, "rate_hz": rate_hz, "first_frame": first}
-    return Motion(tuple(names), times_s, points, tuple(events), angles, metadata, tuple(notes))
+    frames = first - 1 + np.arange(file.frames)
+    return Motion(tuple(names), times_s, points, tuple(events), angles, metadata, tuple(notes), frames)
 
 
 @dataclass

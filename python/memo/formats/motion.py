@@ -77,6 +77,8 @@ class Motion:
     between, by the name of the angle, if it is known."""
     notes: tuple[str, ...] = ()
     """Assumptions and omissions in reading, in sentences."""
+    frames: npt.NDArray[np.int64] | None = None
+    """(T,) numbers of the frames in the video, from 0, increasing; None if the file has none."""
 
     def __post_init__(self) -> None:
         times_s = np.asarray(self.times_s, np.float64)
@@ -98,6 +100,8 @@ class Motion:
                 raise FormatError(f"angle {name}: wanted {times_s.shape}, got {values.shape}")
             if np.isinf(values).any():
                 raise FormatError(f"angle {name}: infinite in frame {np.flatnonzero(np.isinf(values))[0]}")
+        if self.frames is not None and np.shape(self.frames) != times_s.shape:
+            raise FormatError(f"frame numbers: wanted {times_s.shape}, got {np.shape(self.frames)}")
         _check_clock(times_s)
         if np.isinf(points).any():
             frame, point = np.argwhere(np.isinf(points))[0][:2]
@@ -125,13 +129,13 @@ class Motion:
         angles = {name: np.full(count, np.nan) for name in self.angles}
         for name, values in self.angles.items():
             angles[name][steps] = values
-        return rate_hz, replace(self, times_s=times_s, points=points, angles=angles)
+        return rate_hz, replace(self, times_s=times_s, points=points, angles=angles, frames=None)
 
     def resampled(self, rate_hz: float) -> Motion:
         """The motion at another rate, each value interpolated linearly between the two frames around it.
 
-        The new frames begin at the first time stamp and end before the last. A value is missing if one of the
-        two is, or if they are more than three usual intervals apart.
+        The new frames begin at the first time stamp, end before the last, and have no numbers in the video. A
+        value is missing if one of the two is, or if they are more than three usual intervals apart.
         """
         if not (math.isfinite(rate_hz) and rate_hz > 0):
             raise FormatError(f"a rate must be positive and finite, got {rate_hz:g}")
@@ -142,7 +146,7 @@ class Motion:
         count = int(span_s * rate_hz + 1e-6) + 1
         times_s = self.times_s[0] + np.arange(count) / rate_hz
         if len(self.times_s) == 1:
-            return replace(self, metadata={**self.metadata, "rate_hz": rate_hz})
+            return replace(self, metadata={**self.metadata, "rate_hz": rate_hz}, frames=None)
         intervals = np.diff(self.times_s)
         gap_s = 3 * float(np.median(intervals))
         if span_s > _LONGEST_GAP * intervals[intervals <= gap_s].sum() + 60:
@@ -164,6 +168,7 @@ class Motion:
                 for name, v in self.angles.items()
             },
             metadata={**self.metadata, "rate_hz": rate_hz},
+            frames=None,
         )
 
     def filled(self, longest_s: float) -> tuple[Motion, int]:

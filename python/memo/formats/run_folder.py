@@ -109,7 +109,8 @@ def _track(table: Path, events_table: Path, walk: int | None) -> Motion:
         if walk is None or (event.get("walk", walk) == walk and times_s[0] <= event["time_s"] <= times_s[-1])
     ]
     metadata = {"format": "track", "up": "z", "unit": "m", "references": _references("track", angles)}
-    return Motion(names, times_s, points, tuple(kept), angles, metadata, tuple(notes))
+    frames = columns["frame"][chosen].astype(np.int64)
+    return Motion(names, times_s, points, tuple(kept), angles, metadata, tuple(notes), frames)
 
 
 def _read(reader: Callable[[Path], Any], path: Path) -> Any:

@@ -28,6 +28,8 @@ from memo.unfinished import complete_file
 
 __all__ = ["motion_columns", "motion_of_table", "read_table", "write_table"]
 
+_MOST_FRAMES = 1 << 53  # larger whole numbers are not exact in the table
+
 
 def read_table(path: Path, given: Given) -> Motion:
     """Reads points and angles of a table; other columns are ignored."""
@@ -68,7 +70,17 @@ def motion_of_table(table: NumberTable, given: Given) -> Motion:
         angles=angles,
         metadata={"format": "csv", "up": up, "unit": "m"},
         notes=notes,
+        frames=_frames(table),
     )
+
+
+def _frames(table: NumberTable) -> npt.NDArray[np.int64] | None:
+    """The column `frame`, if it holds whole numbers that increase."""
+    if "frame" not in table.column:
+        return None
+    numbers = table.numbers[:, table.column["frame"]]
+    are_whole = (numbers == np.round(numbers)) & (np.abs(numbers) < _MOST_FRAMES)
+    return numbers.astype(np.int64) if are_whole.all() and (np.diff(numbers) > 0).all() else None
 
 
 def _leg(
@@ -101,9 +113,10 @@ def write_table(path: Path, motion: Motion, up: Up) -> list[str]:
     with complete_file(path) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
         if up != "z":
             file.write("# metres, Y up\n")
+        frames = np.arange(len(table)) if motion.frames is None else motion.frames
         rows = (
-            [frame, f"{motion.times_s[frame]:.6f}", *("" if x != x else f"{x:.6f}" for x in row)]
-            for frame, row in enumerate(table.tolist())
+            [frame, f"{time_s:.6f}", *("" if x != x else f"{x:.6f}" for x in row)]
+            for frame, time_s, row in zip(frames.tolist(), motion.times_s, table.tolist(), strict=True)
         )
         write_rows(file, chain([["frame", *columns]], rows))
     return ["A table of joints cannot store events: left out."] if motion.events else []

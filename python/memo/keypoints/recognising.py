@@ -73,6 +73,8 @@ def _is_json(path: Path, content: str) -> bool:
 
 
 def _in_folder(folder: Path, image_size: ImageSize) -> Found:
+    if (folder / "postures.json").is_file():
+        raise KeypointsError(f"{folder}: a folder of `memo posture` holds joints in space, and no keypoints")
     endings = {entry.suffix.lower() for entry in folder.iterdir() if not entry.name.startswith(".")}
     if ".txt" in endings and ".json" not in endings:
         return read_labels(folder, numbered_files(folder, ".txt"), image_size)
