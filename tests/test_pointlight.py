@@ -240,6 +240,7 @@ def test_markers_are_named_by_a_table_and_missing_ones_are_listed(tmp_path, memo
         ("--azimuth-deg nan", 2, "--azimuth-deg nan must be finite"),
         ("--px-per-m 0", 2, "--px-per-m 0 must be positive"),
         ("--shape star", 2, "Invalid value for '--shape'"),
+        ("--shape gaussian --hard", 2, "--hard has no effect with --shape gaussian"),
         ("--noise-dots 3 --noise-kind star", 2, "Invalid value for '--noise-kind'"),
         ("--size 20000x9", 2, "--size must be between 1 and 16384 pixels"),
         ("--fps 0 --cycles 1", 2, "--fps 0 must be positive and finite"),

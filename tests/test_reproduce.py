@@ -546,8 +546,13 @@ def test_the_command_gives_its_rows_as_json(tmp_path, monkeypatch, capsys):
 
 
 @pytest.mark.usefixtures("made_before")
-def test_without_an_argument_all_papers_are_made(tmp_path, monkeypatch, papers):
-    assert run(monkeypatch, "--quiet", "--out", tmp_path) == Exit.DONE
+def test_without_an_argument_all_papers_are_made(tmp_path, monkeypatch, capsys, papers):
+    assert run(monkeypatch, "--out", tmp_path) == Exit.DONE
+    said = " ".join(capsys.readouterr().out.split())
+    figures = len(list(tmp_path.glob("*/*.png")))
+    assert "reproduction.md; in rohr, lee-chen and hoffman-flinchbaugh: reproduction.md and .csv, " in said
+    assert said.endswith(f"{figures} figures and the tables.")
+    assert not (tmp_path / "reproduction.csv").exists()
     for name, reproduction in papers.items():
         assert len(read_csv(tmp_path / name / "reproduction.csv")) == len(reproduction.rows)
         assert f"({name}/reproduction.md)" in (tmp_path / "reproduction.md").read_text(encoding="utf-8")

@@ -177,3 +177,10 @@ def test_a_tracked_walk_corrects_the_distance_of_a_person_with_low_shoulders():
     absolute, relative, bias = track.values[:3]
     assert absolute < 0.5 * height.values[0] and relative < height.values[1]
     assert abs(bias) < 2 * track.values[4]
+
+
+def test_a_track_as_keypoints_is_a_camera_too(tmp_path, memo_command):
+    folder = track_folder(tmp_path / "track", walker(), frames=slice(None))
+    code, said, complaint = memo_command("posture", folder, "--height", 1.75, "--out", tmp_path / "out")
+    wanted = f"memo: --camera is needed, or --track {folder} to take the camera from this track"
+    assert (code, said) == (1, "") and " ".join(complaint.split()) == wanted

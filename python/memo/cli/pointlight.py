@@ -271,6 +271,7 @@ def add_pointlight(app: "typer.Typer") -> None:
             "--scramble-axes needs --scramble-position": scramble_axes is not None and not scramble_position,
             "--scramble-limit-px needs --scramble-position": scramble_limit_px is not None
             and not scramble_position,
+            "--hard has no effect with --shape gaussian": hard and shape is Shape.GAUSSIAN,
             "--seconds cannot be used with MOTION": seconds is not None and bool(motion),
             "--seconds cannot be used with --cycles": seconds is not None and cycles is not None,
             "--speed cannot be used with MOTION": speed is not None and bool(motion),

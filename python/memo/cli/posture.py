@@ -193,6 +193,8 @@ def _posture(
         keypoints = keypoints_of(path, reading)
         row = None if frame is None else _row(keypoints, frame)
         if not {"camera", "track"} & options.keys() and keypoints.image_size is None:
+            if (path / "run.json").is_file():
+                raise InputError(f"--camera is needed, or --track {path} to take the camera from this track")
             raise InputError("--camera is needed, or the size of the picture to assume one: --image-size")
         postures = memo.posture(keypoints, **options, progress=progress)
         (delivery.out / _DRAWN).unlink(

@@ -137,6 +137,8 @@ def _reproduce(paper: Paper, clip: "Clip | None", delivery: Delivery) -> Exit:
             _print(reproduction)
         figures = sum(path.suffix == ".png" for path in written)
         files = f"reproduction.md and .csv, {counted(figures, 'figure')} and the tables"
+        if paper is Paper.ALL:
+            files = f"reproduction.md; in {', '.join(names[:-1])} and {names[-1]}: {files}"
         print(f"Written to {delivery.out}: {files}.")
     return Exit.DONE
 
