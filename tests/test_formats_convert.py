@@ -143,7 +143,7 @@ def test_clinical_hips_are_against_the_pelvis(tmp_path, memo_command):
     np.testing.assert_allclose(raised.angles["right_knee"], plain.angles["right_knee"])
     for ending in (".trc", ".bvh"):
         code, said, err = memo_command("convert", tmp_path / "run", tmp_path / f"b{ending}", "--clinical")
-        wanted = f"memo: --clinical: has no meaning for {ending} files, which hold no joint angles"
+        wanted = f"memo: --clinical: has no effect, as a {ending} file holds no joint angles"
         assert (code, said, err) == (1, "", wanted)
     code, _, err = memo_command("convert", target, tmp_path / "b.mot", "--clinical")
     assert code == 1 and "need a folder of `memo track`" in err

@@ -82,3 +82,17 @@ def test_other_pictures_of_a_walk_give_the_same_numbers(tracked, plain, name):
             again = other.columns[f"{there}_{joint}_deg"][at[1]]
             off = np.sqrt(np.nanmean((angle - again) ** 2))
             assert off < min(MOST_OFF_DEG, np.nanmean(sd)), (side, joint, off)
+
+
+def test_how_times_are_rounded_does_not_decide():
+    scene = memo.demo_scene(0, frames=80)
+
+    def columns(times_s):
+        return memo.track(scene.frames, times_s=times_s, camera=scene.camera, height_m=scene.height_m).columns
+
+    expected = columns(scene.times_s)
+    for times_s in (scene.times_s * (1 + 1e-12), scene.times_s * (1 - 1e-12), scene.times_s + 7.7):
+        found = columns(times_s)
+        np.testing.assert_array_equal(found["frame"], expected["frame"])
+        for name, most in {"x_m": 1e-3, "y_m": 2e-3, "phase": 1e-3, "right_knee_deg": 0.1}.items():
+            np.testing.assert_allclose(found[name], expected[name], rtol=0, atol=most, err_msg=name)

@@ -146,7 +146,7 @@ def _convert(
     if target.is_dir():
         raise InputError(f"{target}: is a folder")
     if writing[2] and target.suffix.lower() in _WITHOUT_ANGLES:
-        raise InputError(f"--clinical: has no meaning for {target.suffix} files, which hold no joint angles")
+        raise InputError(f"--clinical: has no effect, as a {target.suffix} file holds no joint angles")
     if not source.exists():
         raise InputError(nothing_at(source, "file or folder"))
     check_writable(target.parent)
