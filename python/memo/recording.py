@@ -440,7 +440,7 @@ def write_tables(recorded: Recorded, out: Path) -> None:
     """Writes the tables and run.json; removes pictures and the camera's motion of an earlier run.
 
     They take the place of earlier ones together, when all of them are complete. A run that was stopped before
-    anybody was tracked does not take the place of one in which somebody was.
+    anybody was tracked leaves those of an earlier run.
     """
     if recorded.interrupted and not len(recorded.columns["frame"]) and (out / RUN).exists():
         return

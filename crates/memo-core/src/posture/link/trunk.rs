@@ -3,7 +3,7 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::super::prior::{Soft, chi_sq};
+use super::super::prior::chi_sq;
 use super::flip::{Chain, Flip};
 use super::front::Front;
 use super::{Problem, place};
@@ -176,24 +176,21 @@ impl Problem<'_> {
     fn attitude_cost(&self, t: usize, figure: &StickFigure, sd_m: &PerJoint<f64>) -> f64 {
         let Some(axes) = self.reference(figure) else { return 0.0 };
         let prior = &self.options.prior;
-        let usual = |soft: Soft, value: f64, v: DVec3, sd: f64, axis: DVec3, joint: Joint| {
-            soft.cost(value, sd * axis.dot(self.ray(t, joint)).abs() / v.length())
-        };
+        // How far a joint may be off along an axis.
+        let noise_m = |joint: Joint, axis: DVec3| axis.dot(self.ray(t, joint)).abs() * sd_m[joint];
         let spine = figure.segment(Joint::Pelvis);
-        let (pelvis, sd) = (Joint::Pelvis, sd_m[Joint::Pelvis]);
         let roll = axes.z_axis.dot(spine).atan2(axes.y_axis.dot(spine));
-        let lean_noise = sd * axes.x_axis.dot(self.ray(t, pelvis)).abs() / spine.length();
-        let mut cost = prior.trunk_lean.cost(-swing_rad(&axes, spine), lean_noise)
-            + usual(prior.trunk_roll, roll, spine, sd, axes.z_axis, pelvis);
+        let spine_noise = |axis: DVec3| noise_m(Joint::Pelvis, axis) / spine.length();
+        let mut cost = prior.trunk_lean.cost(-swing_rad(&axes, spine), spine_noise(axes.x_axis))
+            + prior.trunk_roll.cost(roll, spine_noise(axes.z_axis));
         for (right, left, soft) in [
             (Joint::RightShoulder, Joint::LeftShoulder, prior.shoulder_turn),
             (Joint::RightHip, Joint::LeftHip, prior.hip_turn),
         ] {
             let line = figure[left] - figure[right];
             let turn = axes.x_axis.dot(line).atan2(axes.z_axis.dot(line));
-            let [sd_right, sd_left] =
-                [right, left].map(|joint| axes.x_axis.dot(self.ray(t, joint)) * sd_m[joint]);
-            cost += soft.cost(turn, sd_right.hypot(sd_left) / line.length());
+            let [noise_right, noise_left] = [right, left].map(|joint| noise_m(joint, axes.x_axis));
+            cost += soft.cost(turn, noise_right.hypot(noise_left) / line.length());
         }
         let [right, left] = [Joint::RightShoulder, Joint::LeftShoulder];
         let forward = axes.x_axis.dot(figure[Joint::Neck] - 0.5 * (figure[right] + figure[left]));
