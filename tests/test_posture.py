@@ -834,6 +834,42 @@ def test_what_is_undecided_does_not_depend_on_rounding(scene):
     np.testing.assert_array_equal(nearly.undecided_joints, as_given.undecided_joints)
 
 
+def test_what_is_undecided_of_a_mirrored_scene_is_the_mirror_image(scene):
+    """Camera and points mirrored, right and left exchanged: the same problem.
+
+    Segments that are too short to reach their rays are among them.
+    """
+    folder, truth = scene
+    pixels = project(truth) + np.random.default_rng(3).normal(0, 3.0, (*truth.shape[:2], 2))
+    lengths_m = {name: 0.94 * length_m for name, length_m in true_lengths(truth).items()}
+    camera = memo.Camera.from_toml(folder / "camera.toml")
+    mirror = np.diag([-1.0, 1.0, 1.0])
+    rotation, translation = mirror @ camera.rotation @ mirror, mirror @ camera.translation
+    other_camera = memo.Camera(camera.matrix, rotation, translation, camera.size)
+    other_pixels = pixels.copy()
+    other_pixels[..., 0] = 2 * camera.matrix[0, 2] - pixels[..., 0]
+
+    def exchanged(name):
+        return name.replace("right", "-").replace("left", "right").replace("-", "left")
+
+    def of_joints(name):
+        return name if name in lengths_m else "_to_".join(reversed(name.split("_to_")))
+
+    other_lengths_m = {of_joints(exchanged(name)): length_m for name, length_m in lengths_m.items()}
+    other_names = [exchanged(name) for name in JOINTS]
+    sides = [JOINTS.index(name) for name in other_names]
+
+    def posture(pixels, names, camera, lengths_m):
+        points = memo.Keypoints.from_arrays(pixels, names=names, fps=25, image_size=SIZE)
+        return memo.posture(points, camera=camera, lengths=lengths_m, noise_px=3)
+
+    found = posture(pixels, JOINTS, camera, lengths_m)
+    other = posture(other_pixels, other_names, other_camera, other_lengths_m)
+    assert (found.gap_m > 0).sum() > 20 and found.undecided_joints.sum() > 20
+    np.testing.assert_allclose(other.smoothed_m[:, sides] * [-1, 1, 1], found.smoothed_m, atol=1e-6)
+    np.testing.assert_allclose(other.p_mirrored[:, sides], found.p_mirrored, atol=1e-4)
+
+
 def test_a_frame_is_undecided_if_a_joint_in_it_is(scene, tmp_path, memo_posture):
     """In the object, the sentence, the document and the page, as in the table."""
     folder, truth = scene

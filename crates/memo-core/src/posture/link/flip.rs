@@ -35,6 +35,8 @@ pub(super) struct Chain<'a> {
     pub acceleration_mps2: &'a [f64],
     /// Sets of bits that may be mirrored together.
     pub masks: &'a [usize],
+    /// The bits of a mask whose excursions are those of the mask: of both sides alike.
+    pub leading: fn(usize) -> usize,
     /// The bits whose extents change if those of a mask change.
     pub affected: fn(usize) -> usize,
     /// `(bit, frame, state)`: signed extent of the bit's segment along the ray.
@@ -85,16 +87,20 @@ impl Chain<'_> {
     /// The mirrorings whose cost depends on any of the given stretches, cheapest first.
     fn flips_near(&self, states: &[usize], stretches: &[[usize; 2]]) -> Vec<Flip> {
         let mut spans: Vec<[usize; 3]> = Vec::new();
+        let all_bounds: Vec<Vec<usize>> =
+            (0..self.acceleration_mps2.len()).map(|bit| self.bounds(states, bit)).collect();
         for &mask in self.masks {
-            let bounds = self.bounds(states, mask.trailing_zeros() as usize);
-            for (i, &from) in bounds.iter().enumerate() {
-                let ends = bounds[i + 1..].iter().take(LONGEST);
-                spans.extend(ends.map(|&to| [mask, from, to]));
-            }
-            if bounds.len() > LONGEST + 1 {
+            let leading = (self.leading)(mask);
+            for (_, bounds) in all_bounds.iter().enumerate().filter(|(bit, _)| leading >> bit & 1 == 1) {
+                for (i, &from) in bounds.iter().enumerate() {
+                    let ends = bounds[i + 1..].iter().take(LONGEST);
+                    spans.extend(ends.map(|&to| [mask, from, to]));
+                }
                 spans.push([mask, 0, states.len()]);
             }
         }
+        spans.sort_unstable();
+        spans.dedup();
         let mut flips: Vec<Flip> = spans
             .into_par_iter()
             .filter(|&[_, from, to]| overlaps(stretches, self.around(from, to)))
@@ -256,7 +262,15 @@ mod tests {
         extent: &'a (dyn Fn(usize, usize, usize) -> Measured + Sync),
     ) -> Chain<'a> {
         let affected = |mask: usize| if mask & 1 == 1 { 3 } else { mask };
-        Chain { times_s, acceleration_mps2: &[4.0, 6.0], masks: &[1, 2, 3], affected, extent, cost }
+        Chain {
+            times_s,
+            acceleration_mps2: &[4.0, 6.0],
+            masks: &[1, 2, 3],
+            leading: |mask| mask,
+            affected,
+            extent,
+            cost,
+        }
     }
 
     /// If the whole path is within the cost of the stretch, the extra cost of mirroring is the difference of the
@@ -332,6 +346,7 @@ mod tests {
             times_s: &times_s,
             acceleration_mps2: &[15.0],
             masks: &[1],
+            leading: |mask| mask,
             affected,
             extent: &swing,
             cost: &none,

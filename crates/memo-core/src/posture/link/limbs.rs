@@ -33,6 +33,9 @@ const READINGS: usize = 1 << SEGMENTS;
 /// Sets of segments that may be mirrored together: one segment, a whole limb, both inner segments, all.
 const MASKS: [usize; 8] = [1, 2, 4, 8, 3, 12, 5, 15];
 
+/// Both inner segments.
+const INNER: usize = 5;
+
 /// One limb's four readings in a frame.
 #[derive(Clone, Copy)]
 pub(super) struct LimbFrame {
@@ -167,7 +170,8 @@ impl Pair {
             times_s,
             acceleration_mps2: &self.acceleration_mps2,
             masks: &MASKS,
-            affected: |mask| mask | (mask & 0b0101) << 1,
+            leading: |mask| if mask & INNER == 0 { mask } else { mask & INNER },
+            affected: |mask| mask | (mask & INNER) << 1,
             extent: &|bit, t, state| self.extent(bit, t, state),
             cost: &|t, state| cost[t][state],
         };
@@ -353,6 +357,7 @@ mod tests {
                     times_s: &problem.times_s(),
                     acceleration_mps2: &readings.acceleration_mps2,
                     masks: &MASKS,
+                    leading: |mask| mask,
                     affected: |_| READINGS - 1,
                     extent: &|bit, t, state| readings.extent(bit, t, state),
                     cost: &|_, _| 0.0,

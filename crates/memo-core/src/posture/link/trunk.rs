@@ -31,6 +31,9 @@ const MASKS: [usize; 8] = [1, 2, 4, 8, 16, 3, 24, TURN];
 /// The set that flips a trunk: shoulders and hips.
 const TURN: usize = 27;
 
+/// Both shoulders.
+const SHOULDERS: usize = 3;
+
 /// Skip flipped trunks that cost more than 20 nats per second (of at least one second) above the best trunk. On
 /// walks the limbs compensated for up to 9 nats per second.
 const WORTH_TRYING_PER_S: f64 = 20.0;
@@ -87,6 +90,7 @@ impl Trunk {
             times_s: &problem.times_s(),
             acceleration_mps2: &[acceleration; 5],
             masks: &MASKS,
+            leading: |mask| if mask == TURN { SHOULDERS } else { mask },
             affected: |mask| if mask & 4 == 4 { 4 | 8 | 16 } else { mask },
             extent: &|bit, t, state| readings[t][state].extents[bit],
             cost: &|t, state| readings[t][state].cost,
@@ -121,9 +125,16 @@ pub(super) fn joints_of(mask: usize) -> Vec<Joint> {
     bits.map(|(_, joint)| joint).collect()
 }
 
-/// The readings of the smallest cost; among equal ones, those of lower number.
+/// The readings of the smallest cost; among equal ones, those of lower number. Where near and far root are one point, the
+/// near one stands for both.
 fn cheapest(readings: &[Reading; READINGS]) -> Vec<usize> {
-    let mut order: Vec<usize> = (0..READINGS).collect();
+    let stands = |bits: usize| {
+        (0..JOINTS.len()).all(|bit| {
+            let [own, near] = [bits, bits & !(1 << bit)].map(|bits| readings[bits].extents[bit].value);
+            bits >> bit & 1 == 0 || own.total_cmp(&near).is_ne()
+        })
+    };
+    let mut order: Vec<usize> = (0..READINGS).filter(|&bits| stands(bits)).collect();
     order.sort_by(|&a, &b| readings[a].cost.total_cmp(&readings[b].cost));
     order.truncate(KEPT);
     order

@@ -317,7 +317,8 @@ fn rejected(scene: &Scene, found: &Found) -> Vec<Warning> {
     }
     let linked = breaking(true) as f64 / of.max(1) as f64;
     let (against, possible) = (empty - impossible, of - impossible);
-    if 2 * against > possible || linked > 0.5 {
+    // Where no body is possible, nothing speaks for or against a way of moving.
+    if possible > 0 && (2 * against > possible || linked > 0.5) {
         let (motion, strength) = (scene.options.motion, scene.options.strength);
         warnings.push(Warning::AgainstRules { motion, strength, frames: against, of: possible, linked });
     }
@@ -547,6 +548,9 @@ mod tests {
             neck: &found.neck,
         };
         assert_eq!(rejected(&scene, &of), [Warning::NothingPossible { frames: 10, of: 10 }]);
+        let broken = vec![vec![Constraint::ArmsOpposed]; 10];
+        let breaking = rejected(&scene, &Found { linked_breaks: &broken, ..of });
+        assert_eq!(breaking, [Warning::NothingPossible { frames: 10, of: 10 }]);
         // Conflicts give a warning if they occur in more than one frame in ten.
         let conflict = |frames| SourceConflict {
             sources: [AnchorSource::Ground, AnchorSource::Trunk],
