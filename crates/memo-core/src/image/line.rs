@@ -112,7 +112,7 @@ pub fn edge_segments(
 ///
 /// 1. Split a piece at its farthest point from the chord until every piece is within the tolerance of its own
 ///    line.
-/// 2. Join neighbouring pieces that one line fits within the tolerance.
+/// 2. Join neighbouring pieces that one line fits within the tolerance, those that it fits best first.
 /// 3. Keep the pieces that are long enough.
 ///
 /// # Errors
@@ -238,7 +238,8 @@ impl<'a> Chain<'a> {
         self.points[piece.clone()].iter().all(|&p| line.distance(p) <= max_deviation_px)
     }
 
-    /// Pieces in order, each within the tolerance of its own line.
+    /// Pieces in order, each within the tolerance of its own line. The point of a cut is the end of both its pieces, so that
+    /// a chain has the same pieces from either end.
     fn split(&self, max_deviation_px: f64) -> Vec<Range<usize>> {
         let mut pieces = Vec::new();
         let mut open = vec![self.whole()];
@@ -249,7 +250,7 @@ impl<'a> Chain<'a> {
             }
             let cut = self.farthest_from_chord(&piece);
             open.push(cut..piece.end);
-            open.push(piece.start..cut);
+            open.push(piece.start..cut + 1);
         }
         pieces
     }
@@ -267,21 +268,27 @@ impl<'a> Chain<'a> {
         inner.max_by(|i, j| distance(i).total_cmp(&distance(j))).unwrap_or(piece.start + 1)
     }
 
-    /// Joins neighbours from left to right as long as the common line is within the tolerance.
-    fn join(&self, pieces: Vec<Range<usize>>, max_deviation_px: f64) -> Vec<Range<usize>> {
-        let mut joined: Vec<Range<usize>> = Vec::with_capacity(pieces.len());
-        for mut piece in pieces {
-            while let Some(before) = joined.last() {
-                let both = before.start..piece.end;
-                if !self.is_straight(&both, max_deviation_px) {
-                    break;
-                }
-                joined.pop();
-                piece = both;
+    /// Joins neighbours whose common line is within the tolerance, those that it fits best first.
+    fn join(&self, mut pieces: Vec<Range<usize>>, max_deviation_px: f64) -> Vec<Range<usize>> {
+        let common = |before: &Range<usize>, after: &Range<usize>| {
+            let both = before.start..after.end;
+            self.is_straight(&both, max_deviation_px).then(|| self.line(&both).residual_rms())
+        };
+        // Entry i is of pieces i and i + 1.
+        let mut residuals: Vec<Option<f64>> =
+            pieces.windows(2).map(|pair| common(&pair[0], &pair[1])).collect();
+        let best = |residuals: &[Option<f64>]| {
+            let joinable = residuals.iter().enumerate().filter_map(|(i, residual)| Some((i, (*residual)?)));
+            joinable.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(i, _)| i)
+        };
+        while let Some(i) = best(&residuals) {
+            pieces[i].end = pieces.remove(i + 1).end;
+            residuals.remove(i);
+            for k in i.saturating_sub(1)..(i + 1).min(residuals.len()) {
+                residuals[k] = common(&pieces[k], &pieces[k + 1]);
             }
-            joined.push(piece);
         }
-        joined
+        pieces
     }
 
     /// The line refitted without the points more than twice the RMS distance away: the Gaussian rounds

@@ -165,14 +165,21 @@ proptest! {
         }).collect();
         let options = LineOptions { max_deviation_px: tolerance, min_length_px: 0.0 };
         let found = segments_through(&points, &options);
-        let lone = points.len() - found.iter().map(|s| s.edgel_count).sum::<usize>();
-        prop_assert!(lone <= found.len() + 1, "{lone} points in no segment");
+        // The point of a cut belongs to both segments.
         let mut first = 0;
-        for s in found.iter().filter(|_| lone == 0) {
+        for s in &found {
             for p in &points[first..first + s.edgel_count] {
                 prop_assert!(s.direction().perp_dot(*p - s.start_px).abs() <= tolerance + 1e-5);
             }
-            first += s.edgel_count;
+            first += s.edgel_count - 1;
+        }
+        prop_assert_eq!(first + 1, points.len());
+        // From the other end, as in the negative picture, the segments are the same.
+        let reversed: Vec<DVec2> = points.iter().rev().copied().collect();
+        let back = segments_through(&reversed, &options);
+        prop_assert_eq!(back.len(), found.len());
+        for (s, r) in found.iter().zip(back.iter().rev()) {
+            prop_assert!(s.start_px.distance(r.end_px).max(s.end_px.distance(r.start_px)) < 1e-4, "{s:?} {r:?}");
         }
     }
 }
@@ -240,7 +247,7 @@ fn neighbouring_pieces_are_not_one_line() {
         joined += split.len() - pieces.len();
         assert_eq!((pieces[0].start, pieces.last().unwrap().end), (0, 120));
         for pair in pieces.windows(2) {
-            assert_eq!(pair[0].end, pair[1].start);
+            assert_eq!(pair[0].end, pair[1].start + 1);
             assert!(!chain.is_straight(&(pair[0].start..pair[1].end), 1.0), "{pair:?}");
         }
         // The segments are those of the joined pieces.
