@@ -58,6 +58,32 @@ def test_who_goes_away_is_placed_where_the_feet_are():
     assert abs(along_m.mean()) < 0.12
 
 
+def test_two_who_come_nearer_side_by_side_are_both_followed(scene):
+    """The same person a second time, 210 pixels to the right and 12 frames later."""
+    frames = np.array(scene.frames)
+    empty = np.median(frames, axis=0).astype(int)
+    later, aside = 12, 210
+    moved = np.roll(frames, (later, aside), axis=(0, 2))
+    is_person = np.roll(np.abs(frames - empty) > 6, (later, aside), axis=(0, 2))
+    is_person[:later] = False
+    is_person[:, :, :aside] = False
+    both = np.where(is_person, moved, frames)
+    found = memo.track(list(both), fps=25, camera=scene.camera)
+    assert [walk.is_frontal for walk in found.walks] == [True, True]
+    assert len({walk.person for walk in found.walks}) == 2
+    (alone,) = memo.track(list(frames), fps=25, camera=scene.camera).walks
+    first = min(found.walks, key=lambda walk: walk.columns["frame"][0])
+    of_both = np.isin(alone.columns["frame"], first.columns["frame"])
+    assert of_both.sum() > 60
+    rows = np.isin(first.columns["frame"], alone.columns["frame"])
+    assert np.median(np.abs(first.columns["y_m"][rows] - alone.columns["y_m"][of_both])) < 0.15
+
+
+def test_only_what_the_rhythm_shows_is_an_event(track):
+    """When feet leave the ground is not seen, only assumed: after 61 % of the cycle."""
+    assert {event["event"] for event in track.events} == {"heel_strike"}
+
+
 def test_the_summary_says_what_was_measured_and_what_not(track):
     summary = track.summary
     assert "walks towards the camera" in summary["message"] and "not certain" not in summary["message"]

@@ -54,6 +54,18 @@ impl Standing {
         standing
     }
 
+    /// How much of a rectangle is where the thing was last seen; `None` if it is elsewhere.
+    pub(super) fn overlap(&self, rectangle: &Rectangle) -> Option<f64> {
+        let last = self.kept.iter().rev().find_map(|(sighting, _)| *sighting)?.rectangle;
+        (last.gap(rectangle) == [0, 0]).then(|| last.sides(0.0).overlap(&rectangle.sides(0.0)))
+    }
+
+    /// True if it was not seen in too many frames before this one.
+    pub(super) fn is_gone(&self, frame: usize) -> bool {
+        let seen = self.kept.iter().rev().find(|(sighting, _)| sighting.is_some());
+        seen.is_none_or(|(_, edges)| edges.frame + self.most_missed() < frame)
+    }
+
     fn most_missed(&self) -> usize {
         lasting(MISSED_FRAMES, self.every_s())
     }

@@ -151,8 +151,8 @@ pub struct Tracker {
     /// Walks that are over, and since when. Somebody may start there again.
     fading: Vec<(f64, Active)>,
     identities: Identities,
-    /// Frames of something that may walk on the spot.
-    standing: Standing,
+    /// Frames of what may walk on the spot or along the line of sight.
+    standings: Vec<Standing>,
     /// What moves and is not followed.
     unfollowed: Unfollowed,
     /// How a camera that is not given is tilted, by the first frame with something that may be a person.
@@ -192,7 +192,7 @@ impl Tracker {
             people: Vec::new(),
             fading: Vec::new(),
             identities: Identities::default(),
-            standing: Standing::default(),
+            standings: Vec::new(),
             unfollowed: Unfollowed::default(),
             tilt: None,
             boxes: BTreeMap::new(),

@@ -10,7 +10,6 @@ use super::super::fit::{FitError, WalkFit};
 use super::super::left_out::Reason;
 use super::super::people::Sign;
 use super::super::result::TrackedWalk;
-use super::super::standing::Standing;
 use super::super::steady::Loss;
 use super::super::unexplained::{self, has_no_legs};
 use super::Tracker;
@@ -55,7 +54,7 @@ impl Tracker {
         self.candidates.clear();
         self.sought.clear();
         self.side_by_side.clear();
-        self.standing = Standing::default();
+        self.standings.clear();
         self.tilt = None;
         self.identities.forget_ended();
         self.backdrop = Backdrop::default();

@@ -177,17 +177,15 @@ impl Tracker {
         if active.settled || !active.shows_path(&self.options) {
             return;
         }
-        if self.people.len() == 1 {
-            let active = self.people.remove(k);
-            let active = self.begun_otherwise(active);
-            self.people.insert(k, active);
-        }
+        let earlier = self.people[k].earlier.clone();
+        let active = self.people.remove(k);
+        let active = self.begun_otherwise(active);
+        self.people.insert(k, active);
         self.people[k].settle(&self.backdrop, &self.options);
         let followed = self.people[k].steps().last().map(|step| step.frame);
         self.people[k].known_frame = self.people[k].known_frame.and(followed);
-        let standing = std::mem::take(&mut self.standing);
         let active = &mut self.people[k];
-        active.earlier = standing.before(active.kept.first().map_or(0, |(_, edges)| edges.frame));
+        active.earlier = earlier.before(active.kept.first().map_or(0, |(_, edges)| edges.frame));
         let mut active = self.people.remove(k);
         let (person, joined) = (active.person, self.gone_on(&active));
         // Two walks became one.

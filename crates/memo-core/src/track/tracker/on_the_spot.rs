@@ -1,4 +1,4 @@
-//! The tracker on somebody who walks on the spot or along the line of sight, while nobody else is followed.
+//! The tracker on people who walk on the spot or along the line of sight.
 
 use super::super::active::Active;
 use super::super::approach::Approach;
@@ -6,6 +6,7 @@ use super::super::candidate::{COMFORTABLE_MPS, Given, course, feet_cut_off};
 use super::super::decisions::MOST_APART_S;
 use super::super::evidence::Evidence;
 use super::super::fit::views::Piece;
+use super::super::height::is_of_a_person;
 use super::super::locate::{Crown, Rows, Sighting, locate_by};
 use super::super::options::{approaching_height, start_height};
 use super::super::standing::Standing;
@@ -19,37 +20,92 @@ const LONGEST_S: f64 = 4.0;
 const SHORTEST_S: f64 = 1.5;
 
 impl Tracker {
-    /// Collects frames of what may walk on the spot.
+    /// Collects frames of what may walk on the spot or along the line of sight: the largest region while nobody is followed, and
+    /// all that a given camera shows to be of a person's size.
     pub(super) fn stand(
         &mut self,
         evidence: &Evidence,
-        sighting: Option<Sighting>,
+        largest: Option<Sighting>,
+        sightings: &[Sighting],
     ) -> Result<(), TrackError> {
-        let standing = std::mem::take(&mut self.standing);
-        let Some(window) = standing.window(sighting.as_ref().map(|s| &s.rectangle)) else { return Ok(()) };
-        let window = grown(&window, evidence, WINDOW_MARGIN_PX);
-        let edges = self.edges(evidence, &window, self.options.camera.as_ref())?;
-        let crown = sighting.as_ref();
-        let piece = |_| Piece::new(evidence.frame, &evidence.grey, window, Vec::new()).with_crown(crown);
-        let feet = sighting.and_then(|sighting| feet(&sighting, evidence, &self.options));
-        self.standing = standing.with(sighting, feet, edges, self.options.fit.map(piece));
+        let given_m = || self.options.height_m.iter().chain(&self.options.further_heights_m).copied();
+        let is_of_a_person = |sighting: &&Sighting| {
+            let camera = self.options.camera.as_ref();
+            largest.as_ref() != Some(sighting)
+                && camera.is_some_and(|camera| is_of_a_person(camera, sighting, given_m()))
+        };
+        let further = sightings.iter().filter(is_of_a_person).copied();
+        let mut seen: Vec<Sighting> = largest.into_iter().chain(further).collect();
+        for standing in std::mem::take(&mut self.standings) {
+            let overlap = |sighting: &Sighting| standing.overlap(&sighting.rectangle);
+            let own = (0..seen.len()).filter(|&k| overlap(&seen[k]).is_some());
+            let own = own.max_by(|&a, &b| {
+                overlap(&seen[a]).unwrap_or(0.0).total_cmp(&overlap(&seen[b]).unwrap_or(0.0))
+            });
+            let own = own.map(|k| seen.remove(k));
+            if let Some(standing) = self.stood(standing, own, evidence)? {
+                self.standings.push(standing);
+            }
+        }
+        for sighting in seen {
+            let standing = self.stood(Standing::default(), Some(sighting), evidence)?;
+            self.standings.extend(standing);
+        }
         Ok(())
     }
 
-    /// Starts a walk on the spot, or one towards the camera or away from it, from time to time when there are enough
-    /// frames.
-    pub(super) fn start_on_the_spot(&mut self, evidence: &Evidence) {
-        let (least, every) = (self.options.path_frames, self.options.start_frames);
-        let further = self.standing.kept.len().checked_sub(least);
-        if !self.people.is_empty() || further.is_none_or(|further| !further.is_multiple_of(every)) {
-            return;
+    /// What stands with the next frame; `None` if it is gone.
+    fn stood(
+        &mut self,
+        standing: Standing,
+        sighting: Option<Sighting>,
+        evidence: &Evidence,
+    ) -> Result<Option<Standing>, TrackError> {
+        let Some(window) = standing.window(sighting.as_ref().map(|s| &s.rectangle)) else { return Ok(None) };
+        if sighting.is_none() && standing.is_gone(evidence.frame) {
+            return Ok(None);
         }
-        if self.standing.lasts_s() > MOST_APART_S * self.standing.kept.len() as f64 {
-            self.standing = Standing::default();
-            return;
+        let window = grown(&window, evidence, WINDOW_MARGIN_PX);
+        let edges = self.unowned_edges(evidence, &window)?;
+        let crown = sighting.as_ref().filter(|_| !edges.shared);
+        let piece =
+            |_| Piece::new(evidence.frame, &evidence.grey, window, edges.others.clone()).with_crown(crown);
+        let piece = self.options.fit.map(piece);
+        let feet = sighting.and_then(|sighting| feet(&sighting, evidence, &self.options));
+        Ok(Some(standing.with(sighting, feet, edges, piece)))
+    }
+
+    /// Takes the frames of what somebody stood for who starts to be followed.
+    pub(super) fn standing_of(&mut self, active: &Active) -> Standing {
+        let at = active.kept.iter().rev().find_map(|(sighting, _)| Some(sighting.as_ref()?.rectangle));
+        let overlap = |standing: &Standing| at.as_ref().and_then(|at| standing.overlap(at));
+        let own = (0..self.standings.len()).filter(|&k| overlap(&self.standings[k]).is_some());
+        let own = own.max_by(|&a, &b| {
+            let [a, b] = [a, b].map(|k| overlap(&self.standings[k]).unwrap_or(0.0));
+            a.total_cmp(&b)
+        });
+        own.map(|k| self.standings.remove(k)).unwrap_or_default()
+    }
+
+    /// Starts walks on the spot, or towards the camera or away from it, from time to time when there are enough frames.
+    pub(super) fn start_on_the_spot(&mut self, evidence: &Evidence) {
+        for standing in std::mem::take(&mut self.standings) {
+            let standing = self.started_on_the_spot(standing, evidence);
+            self.standings.extend(standing);
+        }
+    }
+
+    /// Starts a walk on what stands; otherwise what is left of it.
+    fn started_on_the_spot(&mut self, standing: Standing, evidence: &Evidence) -> Option<Standing> {
+        let (least, every) = (self.options.path_frames, self.options.start_frames);
+        let further = standing.kept.len().checked_sub(least);
+        if further.is_none_or(|further| !further.is_multiple_of(every)) {
+            return Some(standing);
+        }
+        if standing.lasts_s() > MOST_APART_S * standing.kept.len() as f64 {
+            return None;
         }
         let size = [evidence.grey.width() as u32, evidence.grey.height() as u32];
-        let standing = std::mem::take(&mut self.standing);
         let begun = self.begun_where_it_stays(standing, size);
         let along_the_sight = |standing| {
             self.begun_with_a_height(standing, |standing, person| {
@@ -57,17 +113,22 @@ impl Tracker {
             })
         };
         match begun.or_else(along_the_sight) {
+            Ok(active) if !self.is_of_its_own(&active) => None,
             Ok(mut active) => {
-                self.candidates.clear();
+                let last =
+                    active.kept.iter().rev().find_map(|(sighting, _)| Some(sighting.as_ref()?.rectangle));
+                self.candidates.retain(|candidate| !last.is_some_and(|last| candidate.is_at(&last)));
                 match self.gone_on(&active) {
                     Some(joined) => active = joined,
                     None => active.person = self.identified(&active),
                 }
+                active.started_near = !self.people.is_empty();
                 active.known_frame.get_or_insert(evidence.frame);
                 self.people.push(active);
+                None
             }
-            Err(standing) if standing.lasts_s() < LONGEST_S => self.standing = standing,
-            Err(standing) => self.standing = standing.later(every),
+            Err(standing) if standing.lasts_s() < LONGEST_S => Some(standing),
+            Err(standing) => Some(standing.later(every)),
         }
     }
 
@@ -146,11 +207,11 @@ impl Tracker {
 
     /// What was taken for a walk across the picture begins again if it stays where it is and walks on the spot, or if its
     /// feet go along the line of sight.
-    pub(super) fn begun_otherwise(&mut self, active: Active) -> Active {
+    pub(super) fn begun_otherwise(&self, active: Active) -> Active {
         if active.is_on_treadmill || active.frontal.is_some() {
             return active;
         }
-        let standing = self.standing.clone().followed_by(&active.kept, &active.pieces, &active.feet);
+        let standing = active.earlier.clone().followed_by(&active.kept, &active.pieces, &active.feet);
         if standing.kept.len() < self.options.path_frames {
             return active;
         }

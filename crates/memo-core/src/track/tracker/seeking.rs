@@ -7,6 +7,7 @@ use super::super::fit::views::Piece;
 use super::super::height::{is_of_a_person, is_of_one_person};
 use super::super::left_out::Hindrance;
 use super::super::locate::{MASK_MARGIN_PX, Sighting, same_person};
+use super::super::walk::FrameEdges;
 use super::unfollowed::{Moving, with_small_ones};
 use super::{TrackError, Tracker, WINDOW_MARGIN_PX, grown, whole};
 use crate::image::{GroupOptions, Mask, Rectangle, Region, group_regions_of, regions, side_by_side};
@@ -33,9 +34,8 @@ impl Tracker {
         self.report.frames_with_candidate += usize::from(!regions.is_empty());
         let is_cut_off = regions.first().is_some_and(|region| whole(region, evidence).is_none());
         self.report.frames_cut_off += usize::from(is_cut_off);
-        if self.people.is_empty() {
-            self.stand(evidence, regions.first().and_then(|region| whole(region, evidence)))?;
-        }
+        let largest = regions.first().filter(|_| self.people.is_empty());
+        let largest = largest.and_then(|region| whole(region, evidence));
         let moving = match are_given {
             _ if self.people.is_empty() => moving,
             true => Moving::of_size(self.unclaimed(moving.regions)),
@@ -63,6 +63,7 @@ impl Tracker {
         self.notice(evidence, &moving, &hindrances);
         let first = evidence.frame.saturating_sub(self.options.path_frames);
         self.sought.retain(|seen| seen.edges.frame >= first);
+        self.stand(evidence, largest, &sightings)?;
         for sighting in sightings {
             let seen = self.seen(evidence, sighting)?;
             self.sought.push(Arc::new(seen.clone()));
@@ -145,15 +146,7 @@ impl Tracker {
     /// What a candidate shows in a frame, without the edges of people who are followed.
     fn seen(&mut self, evidence: &Evidence, sighting: Sighting) -> Result<Seen, TrackError> {
         let window = grown(&sighting.rectangle, evidence, WINDOW_MARGIN_PX);
-        let mut edges = self.edges(evidence, &window, self.camera())?;
-        for active in &self.people {
-            let Some(expected) = active.as_followed() else { continue };
-            if expected.window.gap(&window) == [0, 0] {
-                edges.shared = true;
-                keep_unowned(&mut edges.edges, &[&expected]);
-                edges.others.extend(expected.body);
-            }
-        }
+        let edges = self.unowned_edges(evidence, &window)?;
         let piece = self.options.fit.map(|_| {
             self.backdrop.occupy(evidence.frame, sighting.rectangle);
             let alone = (!edges.shared).then_some(&sighting);
@@ -161,6 +154,24 @@ impl Tracker {
                 .with_crown(alone)
         });
         Ok(Seen { sighting, edges, piece })
+    }
+
+    /// The edges of a window that are nobody's who is followed, with the bodies of those.
+    pub(super) fn unowned_edges(
+        &mut self,
+        evidence: &Evidence,
+        window: &Rectangle,
+    ) -> Result<FrameEdges, TrackError> {
+        let mut edges = self.edges(evidence, window, self.camera())?;
+        for active in &self.people {
+            let Some(expected) = active.as_followed() else { continue };
+            if expected.window.gap(window) == [0, 0] {
+                edges.shared = true;
+                keep_unowned(&mut edges.edges, &[&expected]);
+                edges.others.extend(expected.body);
+            }
+        }
+        Ok(edges)
     }
 
     /// The boxes given for a frame, the largest first; `None` if none were given.

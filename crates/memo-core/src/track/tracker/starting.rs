@@ -32,15 +32,16 @@ impl Tracker {
                 }
                 begun => begun,
             };
-            let begun = begun.and_then(|active| {
-                let is_own = self.is_somebody_else(&active) && !self.is_left_over(&active);
-                if is_own { Ok(active) } else { Err(Reason::Beside) }
+            let begun = begun.and_then(|active| match self.is_of_its_own(&active) {
+                true => Ok(active),
+                false => Err(Reason::Beside),
             });
             match begun {
                 Ok(mut active) => {
                     let known = self.identities.count();
                     active.person = self.identified(&active);
                     active.started_near = !self.people.is_empty();
+                    active.earlier = self.standing_of(&active);
                     active.before = self.before(&candidate);
                     // In the frames before somebody is back, there may be the earlier walk.
                     if active.person < known {
@@ -103,6 +104,11 @@ impl Tracker {
         let time_s = candidate.seen.first().map_or(0.0, |seen| seen.edges.time_s);
         let back = self.of_other_height(time_s).into_iter().find_map(is_back);
         back.map_or_else(|| begin(self.identities.count()), Ok)
+    }
+
+    /// True if a walk would start on somebody who is not followed, and not on what is left over from somebody who is.
+    pub(super) fn is_of_its_own(&mut self, new: &Active) -> bool {
+        self.is_somebody_else(new) && !self.is_left_over(new)
     }
 
     fn frames_to_start(&self, candidate: &Candidate) -> usize {

@@ -939,12 +939,12 @@ fn who_begins_again_on_the_spot_keeps_the_height() {
 fn a_walk_whose_feet_go_along_the_line_of_sight_begins_again_there() {
     let across = |time_s: f64| MIDDLE + towards().perp() * (SPEED_MPS * time_s - 1.2);
     for (seen, is_along) in [(standing(66, feet_of_steps), true), (standing(66, across), false)] {
-        let mut tracker = tracker();
+        let tracker = tracker();
         let steps = (0..66).map(|k| step(k, 0.05 * k as f64, 1.2)).collect();
         // The first frames are those from before the walk.
         let (kept, feet) = (seen.kept[20..].to_vec(), seen.feet.clone());
-        tracker.standing = seen.before(20);
-        let walk = Active { kept, feet, person: 3, known_frame: Some(12), ..active(steps) };
+        let earlier = seen.before(20);
+        let walk = Active { kept, feet, earlier, person: 3, known_frame: Some(12), ..active(steps) };
         let begun = tracker.begun_otherwise(walk);
         assert_eq!((begun.person, begun.known_frame), (3, Some(12)));
         assert_eq!(begun.is_frontal(), is_along);

@@ -90,7 +90,7 @@ impl Tracker {
             self.people.iter().chain(fading).filter_map(|active| Some(active.steps().first()?.time_s));
         let candidates =
             self.candidates.iter().filter_map(|candidate| Some(candidate.seen.first()?.edges.time_s));
-        let standing = self.standing.kept.first().map(|(_, edges)| edges.time_s);
+        let standing = self.standings.iter().filter_map(|standing| Some(standing.kept.first()?.1.time_s));
         walks.chain(candidates).chain(standing).fold(f64::INFINITY, f64::min)
     }
 
