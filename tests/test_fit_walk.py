@@ -85,6 +85,42 @@ def test_pictures_of_nobody_leave_a_reason(scene, walk, empty):
     assert len(again) == len(walk) and np.all(np.isnan(again.columns["sd_right_hip_deg"]))
 
 
+@pytest.mark.parametrize("level", [0, 90], ids=["black", "grey"])
+def test_pictures_without_any_edge_are_no_fit(scene, walk, level):
+    """Nothing is missed of an outline of which nothing could be seen."""
+    again = memo.fit_walk(walk, np.full_like(scene.frames, level))
+    assert again.fit is None and "100 % of its outline found no edge" in again.fit_problem
+    assert again.p_swapped == 0.5
+
+
+def test_silhouettes_of_zeros_and_ones_are_no_fit(scene, walk, empty, silhouettes):
+    again = memo.fit_walk(walk, silhouettes // 255, empty=np.zeros_like(empty))
+    assert again.fit is None
+
+
+def test_a_foot_that_is_never_seen_has_no_contacts(scene, walk, empty):
+    """The left shank and foot are painted over with the room in every frame."""
+    rows = walk.columns["frame"]
+    frames = np.array(scene.frames)
+    height, width = empty.shape
+    columns, lines = np.arange(width), np.arange(height)
+    for k, frame in enumerate(rows):
+        knee, ankle = (
+            [walk.columns[f"left_{joint}_{axis}_px"][k] for axis in "uv"] for joint in ("knee", "ankle")
+        )
+        below = lines >= knee[1]
+        for line in lines[below]:
+            share = min(1.0, (line - knee[1]) / max(ankle[1] - knee[1], 1.0))
+            middle = knee[0] + share * (ankle[0] - knee[0])
+            hidden = np.abs(columns - middle) < (14 if share < 0.9 else 34)
+            frames[frame, line, hidden] = empty[line, hidden]
+    seen = memo.fit_walk(walk, scene.frames)
+    hidden = memo.fit_walk(walk, frames, empty=empty)
+    sides = [{event.side for event in of.events} for of in (seen, hidden)]
+    assert sides[0] == {"right", "left"}
+    assert "left" not in sides[1]
+
+
 def test_angles_of_a_person_who_was_not_measured_are_empty(scene, empty):
     track = memo.track(list(scene.frames), fps=25, camera=scene.camera, height_m=scene.height_m)
     lost = memo.Track([memo.fit_walk(track.walks[0], [empty] * len(scene.frames))], track.seek_report)

@@ -54,6 +54,31 @@ def write_track(folder, times_s=None):
     return points
 
 
+def test_joints_that_are_those_of_average_gait_are_named_or_left_empty(tmp_path, memo_command):
+    """`track.csv` has a posture in every frame, also where an angle was not measured."""
+    write_track(tmp_path / "run")
+    table = tmp_path / "run" / "track.csv"
+    columns = read_track_csv(table)
+    columns["left_elbow_deg"][:20] = np.nan
+    columns["right_hip_deg"][5:8] = np.nan
+    write_track_csv(table, columns)
+    target = tmp_path / "walk.csv"
+    code, out, _ = memo_command("convert", tmp_path / "run", target)
+    assert code == 0
+    said = "right knee in 3, right ankle in 3 and left wrist in 20."
+    assert "in some of 55 frames, because an angle before them was not measured" in out and said in out
+    assert np.isfinite(read_motion(target).points).all()
+
+    angles = [name for name in columns if name.endswith("_deg") and not name.startswith("sd_")]
+    write_track_csv(table, columns | {name: np.full(len(FRAMES), np.nan) for name in angles})
+    code, out, _ = memo_command("convert", tmp_path / "run", target)
+    assert code == 0
+    assert "No angle was measured: joints beyond hips and shoulders are left empty." in out
+    read = read_motion(target)
+    known = {name for k, name in enumerate(read.names) if np.isfinite(read.points[:, k]).any()}
+    assert known == {"right_shoulder", "left_shoulder", "right_hip", "left_hip"}
+
+
 def test_a_track_is_written_in_every_format(tmp_path, memo_command):
     points = write_track(tmp_path / "run")
     for ending in ("trc", "c3d", "csv", "parquet", "mot", "sto"):

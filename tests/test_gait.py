@@ -10,7 +10,7 @@ from pathlib import Path
 import memo
 import numpy as np
 import pytest
-from conftest import shared_video
+from conftest import SHARED_DATA, shared_video
 from memo import _memo, cli, tracking
 from memo.gait import (
     DEFINITIONS,
@@ -98,6 +98,21 @@ def test_intervals_hold_what_was_motion_captured(name, knows_camera):
     said = [sentence for sentence in track.sentences if "upright lines" not in sentence]
     assert len(said) == 2, "healthy walkers are not called asymmetric"
     assert track.sentences[0].startswith("The model fits the person"), "the verdict comes first"
+
+
+@pytest.mark.parametrize("name", ["BELT__stiff_right", "ANTO__crouch"])
+def test_a_foot_stands_alone_no_longer_than_it_stands(name):
+    clip = SHARED_DATA / "walks" / name
+    if not clip.is_dir():
+        pytest.skip(f"no {clip}")
+    with VideoReader(clip / "video.mp4") as reader:
+        frames = [(frame.luma.copy(), frame.time_s) for frame in reader]
+    lumas, times_s = zip(*frames, strict=True)
+    (walk,) = memo.track(lumas, times_s=times_s, camera=memo.Camera.from_toml(clip / "camera.toml")).walks
+    table = {(row.parameter, row.side): row.value for row in walk.gait_parameters}
+    for side in ("right", "left"):
+        alone, stance = table["single_support", side], table["stance", side]
+        assert np.isfinite(stance) and not alone > stance
 
 
 def test_a_late_left_step_is_found_and_said():

@@ -151,9 +151,7 @@ def write_mot(path: Path, motion: Motion, up: Up, model: Model = RAJAGOPAL) -> l
     """Writes the angles and the position of the pelvis; returns what was left out, in sentences."""
     motion, armless = _of_model(motion, model)
     if not motion.angles:
-        raise FormatError(
-            "a MOT or STO file holds joint angles, and there are none: write points to a TRC file"
-        )
+        raise FormatError("a MOT or STO file holds joint angles, and there are none")
     columns = {"time": motion.times_s}
     pelvis_angles, origin = _pelvis(motion, model)
     if up == "y":

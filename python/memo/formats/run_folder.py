@@ -7,7 +7,7 @@ people, one must be chosen.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,7 +18,7 @@ from memo.files import ANGLES, JOINTS, SIDES, read_events_csv, read_track_csv
 from memo.formats.motion import FormatError, GaitEvent, Motion
 from memo.formats.reading import Given
 from memo.formats.table import read_table
-from memo.wording import counted
+from memo.wording import counted, enumerated
 
 __all__ = ["read_run_folder", "sources"]
 
@@ -33,6 +33,15 @@ _REFERENCES = {
     "postures": {"hip": "thigh against trunk, 0 along it", **_OF_BOTH},
 }
 """What the angles of `track.csv` and `postures.csv` are between: docs/reference/conventions.md."""
+
+
+_ANGLES_BEFORE = {
+    "knee": ("hip",),
+    "ankle": ("hip", "knee"),
+    "elbow": ("shoulder",),
+    "wrist": ("shoulder", "elbow"),
+}
+"""The angles that a joint's place follows from, beside that of hip or shoulder."""
 
 
 def sources(path: Path) -> list[Path]:
@@ -103,6 +112,8 @@ def _track(table: Path, events_table: Path, walk: int | None) -> Motion:
         if walk is None and walks > 1
         else []
     )
+    points, assumed = _measured(names, points, angles)
+    notes += assumed
     kept = [
         GaitEvent(event["time_s"], event["event"], event["side"])
         for event in events
@@ -111,6 +122,40 @@ def _track(table: Path, events_table: Path, walk: int | None) -> Motion:
     metadata = {"format": "track", "up": "z", "unit": "m", "references": _references("track", angles)}
     frames = columns["frame"][chosen].astype(np.int64)
     return Motion(names, times_s, points, tuple(kept), angles, metadata, tuple(notes), frames)
+
+
+def _measured(
+    names: tuple[str, ...], points: np.ndarray, angles: Mapping[str, np.ndarray]
+) -> tuple[np.ndarray, list[str]]:
+    """The points without those that are nothing but average gait, and which of the others are.
+
+    `track.csv` has the likeliest posture in every frame. Where an angle was not measured, joints beyond it
+    are those of average gait.
+    """
+    unknown = np.ones(len(points), bool)
+
+    def is_assumed(joint: str) -> np.ndarray:
+        side, _, name = joint.partition("_")
+        needed = [angles.get(f"{side}_{angle}") for angle in _ANGLES_BEFORE.get(name, ())]
+        of_angles = [unknown if values is None else ~np.isfinite(values) for values in needed]
+        return np.logical_or.reduce([~unknown, *of_angles]) & np.isfinite(points[:, names.index(joint)]).all(
+            -1
+        )
+
+    frames = {name: is_assumed(name) for name in names}
+    counts = {name: int(assumed.sum()) for name, assumed in frames.items() if assumed.any()}
+    if not counts:
+        return points, []
+    if not any(np.isfinite(values).any() for values in angles.values()):
+        points = points.copy()
+        for name in counts:
+            points[frames[name], names.index(name)] = np.nan
+        return points, ["No angle was measured: joints beyond hips and shoulders are left empty."]
+    told = enumerated([f"{name.replace('_', ' ')} in {count}" for name, count in counts.items()])
+    return points, [
+        f"These joints are those of average gait in some of {counted(len(points), 'frame')}, "
+        f"because an angle before them was not measured: {told}."
+    ]
 
 
 def _read(reader: Callable[[Path], Any], path: Path) -> Any:

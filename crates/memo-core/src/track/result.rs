@@ -110,10 +110,6 @@ pub struct Event {
 /// (metres), height (metres), phase (cycles; due to the definition of heel strike).
 const COMMON_SD: [f64; 3] = [0.015, 0.02, 0.015];
 
-/// Phase of toe-off on the side whose heel strike is at 0: in adults at free speed, stance takes 61 % of the
-/// cycle.
-const TOE_OFF_PHASE: f64 = 0.61;
-
 impl TrackedWalk {
     /// The measured person, if the fit succeeded.
     pub fn fitted(&self) -> Option<&WalkFit> {
@@ -329,11 +325,13 @@ impl TrackedWalk {
         }
     }
 
-    /// Heel strikes (initial contacts) and toe-offs in order of time: those of the fitted feet, or the times when the
-    /// phase of the average gait passes them. Empty for backward walking, where toes land first and the phases of
-    /// contact are not known.
+    /// Heel strikes (initial contacts) and toe-offs in order of time: those of the fitted feet. Where none are fitted, heel
+    /// strikes are the times when the phase of the gait passes them, and there are no toe-offs, which only the feet show. Empty
+    /// for backward walking, where toes land first and the phases of contact are not known, and where the model does not fit
+    /// the person.
     pub fn events(&self) -> Vec<Event> {
-        if self.direction() == Direction::Backward {
+        let is_misfit = matches!(self.fit, Some(Err(FitError::Misfit { .. } | FitError::Undetermined)));
+        if self.direction() == Direction::Backward || is_misfit {
             return Vec::new();
         }
         let (rows, steps) = (self.rows(), self.steps());
@@ -352,21 +350,16 @@ impl TrackedWalk {
         self.passed(&rows, |_| true)
     }
 
-    /// Events at which the phase passes its mark between two rows of a kind, in order of time.
+    /// Heel strikes by the phase between two rows of a kind, in order of time.
     fn passed(&self, rows: &[Row], is_of_kind: impl Fn(usize) -> bool) -> Vec<Event> {
-        let marks = [
-            (0.0, EventKind::HeelStrike, Side::Right),
-            (0.5, EventKind::HeelStrike, Side::Left),
-            (TOE_OFF_PHASE, EventKind::ToeOff, Side::Right),
-            (TOE_OFF_PHASE - 0.5, EventKind::ToeOff, Side::Left),
-        ];
+        let marks = [(0.0, Side::Right), (0.5, Side::Left)];
         let mut events = Vec::new();
         for (_, pair) in rows.windows(2).enumerate().filter(|(k, _)| is_of_kind(*k) && is_of_kind(k + 1)) {
-            for (phase, kind, side) in marks {
+            for (phase, side) in marks {
                 events.extend(crossing(&pair[0], &pair[1], phase).map(|t| Event {
                     time_s: pair[0].time_s + t * (pair[1].time_s - pair[0].time_s),
                     frame: pair[0].frame as f64 + t * (pair[1].frame - pair[0].frame) as f64,
-                    kind,
+                    kind: EventKind::HeelStrike,
                     side,
                 }));
             }

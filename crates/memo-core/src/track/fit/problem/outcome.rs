@@ -2,8 +2,8 @@
 
 use super::super::super::decisions::{
     FIT_PLACE_SD, HEIGHT_MODEL_SD_M, MEAN_MODEL_SD_RAD, MEAN_OFF_ACROSS_SD_M, MEAN_OFF_SD_RAD, MEAN_PLACE_SD,
-    MODEL_SD_RAD, MOST_MISSED_OF_ARM, MOST_SD_RAD, OFF_ACROSS_SD_M, OFF_SD_RAD, SD_FACTOR, ZERO_BLUR_PX,
-    ZERO_SD,
+    MODEL_SD_RAD, MOST_MISSED_OF_ARM, MOST_MISSED_OF_FOOT, MOST_SD_RAD, OFF_ACROSS_SD_M, OFF_HEIGHT_SD_M,
+    OFF_SD_RAD, SD_FACTOR, ZERO_BLUR_PX, ZERO_SD,
 };
 use super::super::belt::{self, Belt};
 use super::super::contacts::{self, Contact, Feet};
@@ -16,6 +16,7 @@ use super::{Fitted, Problem};
 use crate::estimate::arrow::Covariance;
 use crate::estimate::median::median;
 use crate::model::body::Part;
+use crate::model::skeleton::Side;
 use crate::track::event::EventKind;
 use crate::track::height::{BodyHeight, HeightSource};
 use glam::DVec2;
@@ -30,6 +31,12 @@ pub(super) fn arms_seen(quality: &FitQuality) -> [[bool; JOINTS]; 2] {
         let shoulder = is_seen(upper_arm);
         [true, true, true, shoulder, shoulder && is_seen(forearm)]
     })
+}
+
+/// True if the outline of a foot, where contacts are measured, has edges.
+fn is_foot_seen(quality: &FitQuality, side: Side) -> bool {
+    let foot = if side == Side::Right { Part::RightFoot } else { Part::LeftFoot };
+    quality.parts[foot as usize].is_none_or(|of_part| of_part.missed <= MOST_MISSED_OF_FOOT)
 }
 
 impl Problem<'_> {
@@ -53,7 +60,8 @@ impl Problem<'_> {
         FitQuality {
             residual_px: seen.distance_px / (seen.outer - seen.outer_missed).max(1.0),
             height_px: fitted.height_px,
-            missed: seen.outer_missed / seen.outer.max(1.0),
+            // Pictures that show nothing of the person show no edge of the outline.
+            missed: if seen.outer > 0.0 { seen.outer_missed / seen.outer } else { 1.0 },
             missed_inside: seen.inner_missed / seen.inner.max(1.0),
             worst_length_sd: lengths.fold(0.0, f64::max),
             sole_m: self.is_scale_seen.then(|| self.mean_sole_m(&fitted.unknowns)),
@@ -125,8 +133,9 @@ impl Problem<'_> {
         }
         // Feet that stand move with a belt, and how fast nobody knows without one.
         let are_still = belt.is_some() || !self.is_on_treadmill;
-        let contacts =
+        let mut contacts =
             if are_still { contacts::contacts(&times_s, &phases, &feet, &ahead) } else { Vec::new() };
+        contacts.retain(|contact| is_foot_seen(&quality, contact.side));
         // Phase 0 is the initial contact where the feet show it, and not where the average curves have it.
         let [zero, zero_sd] = self.zero(&contacts, &times_s, &phases, &quality);
         for frame in &mut all {
@@ -173,7 +182,9 @@ impl Problem<'_> {
         let is_seen = self.is_scale_seen && !quality.is_off_ground() && weight > 0.0 && weight.is_finite();
         is_seen.then(|| BodyHeight {
             height_m: height_m * (1.0 + seen),
-            sd_m: (SD_FACTOR * height_m / weight.sqrt()).hypot(HEIGHT_MODEL_SD_M),
+            sd_m: (SD_FACTOR * height_m / weight.sqrt())
+                .hypot(HEIGHT_MODEL_SD_M)
+                .hypot(OFF_HEIGHT_SD_M * fitted.seen.off()),
             source: HeightSource::Measured,
             scale_sd: 0.0,
         })
