@@ -112,6 +112,16 @@ def test_texts_of_yolo_are_read(tmp_path):
     assert np.allclose(read.points[0], points[0], atol=0.01) and np.isnan(read.points[4]).all()
 
 
+def landmarks(values):
+    """Landmarks as `dataclasses.asdict` gives them."""
+    return [
+        {"x": x, "y": y, "z": z, "visibility": 0.9, "presence": 0.9, "name": None}
+        for x, y, z in np.asarray(values, float).tolist()
+    ]
+
+
+WORLD = np.random.default_rng(0).normal(0, 0.4, (33, 3))
+WORLD[[23, 24]] = (-0.1, 0, 0), (0.1, 0, 0)
 NOBODY = "no person in any frame"
 
 
@@ -137,6 +147,11 @@ NOBODY = "no person in any frame"
         (np.tile([0.5, 0.5, 0.1, 7.0], (4, 33, 1)).tolist(), r"last numbers \(7 to 7\) are no visibility"),
         (np.tile([0.5, 0.5, 7.0], (4, 33, 1)).tolist(), r"\(7 to 7\) are no visibility; wanted \(T, 33, 4\)"),
         ([[[0.5, 0.5, 0.5, 1.0]] * 23 + [[0.0, 0.0, 0.1, 1.0]] * 10], "these are world landmarks"),
+        ([landmarks(WORLD)] * 4, "hips are at 0 in every frame: these are world landmarks"),
+        ([{"pose_landmarks": [landmarks(WORLD)]}] * 4, "these are world landmarks; save the landmarks in"),
+        ([{"pose_world_landmarks": [landmarks(WORLD)]}] * 4, "these are world landmarks; save the landmarks"),
+        ([{"worldLandmarks": []}, {"worldLandmarks": [landmarks(WORLD)]}], "these are world landmarks"),
+        ([landmarks(300 + 200 * WORLD)] * 4, "coordinates up to [0-9]+, which are no fractions"),
         ([[[0.5, 0.5, 0.1]] * 32 + [[0.5, 0.5]]], "wanted 33 landmarks of 3 or 4 numbers each"),
         ([[[10**400, 0.5, 0.1]] * 33], "a number too large"),
         ([[{"x": 10**400, "y": 0.5}] * 33], "landmark 0, x: 1.* is not a number"),

@@ -11,7 +11,8 @@ has not. `timestamp_ms` beside a result gives its time. Source: google-ai-edge/m
 `mediapipe/tasks/python/components/containers/landmark.py`.
 
 Pixel u = x width - 0.5, because 0 and 1 are the edges of the image. Scores are the visibility, else 1. The
-world landmarks are not used: they are estimated by a network from the picture.
+world landmarks are not used, because a network estimates them from the picture, and they are refused if they
+are saved alone; so are landmarks in pixels.
 """
 
 from __future__ import annotations
@@ -29,16 +30,20 @@ from memo.keypoints.text import short
 __all__ = ["is_mediapipe", "is_nobody", "read_mediapipe"]
 
 _RESULTS = ("pose_landmarks", "landmarks", "poseLandmarks")
+_WORLD = ("pose_world_landmarks", "worldLandmarks", "poseWorldLandmarks")
 _LANDMARKS = 33
 _HIPS = (23, 24)
 _LARGEST_FRACTION = 1.5  # of most points; some may lie farther outside of the picture
 _AT_ORIGIN = 1e-3
+_ARE_WORLD = "these are world landmarks; save the landmarks in the picture (pose_landmarks)"
 
 
 def is_mediapipe(data: Any) -> bool:
     """Whether this is a list with the landmarks of each frame."""
     if not isinstance(data, list):
         return False
+    if any(_is_only_world(entry) for entry in data):
+        return True
     first = _first_person(data)
     return bool(first) and (_is_landmark(first[0]) or (_is_row(first[0]) and len(first) == _LANDMARKS))
 
@@ -57,35 +62,61 @@ def _first_person(data: list[Any]) -> list[Any]:
 
 def read_mediapipe(path: Path, data: list[Any], image_size: tuple[int, int] | None) -> Found:
     """All people in a file."""
-    if _is_row(_first_person(data)[0]):
-        data = _from_array(path, data)
+    if any(_is_only_world(entry) for entry in data):
+        raise KeypointsError(f"{path}: {_ARE_WORLD}")
+    is_array = _is_row(_first_person(data)[0])
+    entries = _from_array(path, data) if is_array else _from_objects(path, data)
     if image_size is None:
         raise OptionError(
             f"{path}: MediaPipe's coordinates are fractions of the picture: give its width and height",
             "image_size",
         )
-    people = []
-    times_s = {}
-    for frame, entry in enumerate(data):
-        where = f"{path}: entry {frame}"
-        if isinstance(entry, dict) and "timestamp_ms" in entry:
-            times_s[frame] = _number(entry["timestamp_ms"], f"{where}, timestamp_ms") / 1000
-        found = _people(entry)
-        if found is None:
-            got = ", ".join(entry) if isinstance(entry, dict) else short(entry)
-            raise KeypointsError(f"{where}: wanted one of {', '.join(_RESULTS)}, or a list; got {short(got)}")
-        for place, landmarks in enumerate(found):
-            values = _values(landmarks, image_size, f"{where}, person {place}")
-            people.append(Person(frame, values, None))
-    if times_s and len(times_s) < len(data):
-        raise KeypointsError(f"{path}: {len(times_s)} of {len(data)} entries have timestamp_ms: all or none")
+    people = [
+        Person(frame, _in_pixels(values, image_size, f"{path}: entry {frame}, person {place}"), None)
+        for frame, those in enumerate(entries)
+        for place, values in enumerate(those)
+    ]
     return Found(
         Source(path, None),
         people,
-        times_s=times_s or None,
+        times_s=_times_s(path, data),
         image_size=image_size,
         frames=tuple(range(len(data))),
     )
+
+
+def _times_s(path: Path, data: list[Any]) -> dict[int, float] | None:
+    """The time of each entry, if they have times."""
+    times_s = {
+        frame: _number(entry["timestamp_ms"], f"{path}: entry {frame}, timestamp_ms") / 1000
+        for frame, entry in enumerate(data)
+        if isinstance(entry, dict) and "timestamp_ms" in entry
+    }
+    if times_s and len(times_s) < len(data):
+        raise KeypointsError(f"{path}: {len(times_s)} of {len(data)} entries have timestamp_ms: all or none")
+    return times_s or None
+
+
+def _is_only_world(entry: Any) -> bool:
+    """Whether an entry has world landmarks and none in the picture."""
+    if not isinstance(entry, dict) or any(key in entry for key in _RESULTS):
+        return False
+    return any(key in entry for key in _WORLD)
+
+
+def _check_fractions(path: Path, values: Array) -> None:
+    """Refuses landmarks (N, 33, 3 or 4) of all people that are in pixels or world landmarks."""
+    places = values[np.isfinite(values).all(axis=2)][:, :2]
+    if not len(places):
+        raise KeypointsError(f"{path}: no person in any frame")
+    if np.median(np.abs(places)) > _LARGEST_FRACTION:
+        raise KeypointsError(
+            f"{path}: landmarks with coordinates up to {np.abs(places).max():.0f}, which are no fractions of "
+            'the picture; pass pixels to memo.Keypoints.from_arrays(points, names="MEDIAPIPE_33")'
+        )
+    hips = values[:, _HIPS, :2].mean(axis=1)
+    if np.nanmax(np.abs(hips), initial=0) < _AT_ORIGIN:
+        raise KeypointsError(f"{path}: the hips are at 0 in every frame: {_ARE_WORLD}")
 
 
 def _people(entry: Any) -> list[Any] | None:
@@ -125,22 +156,8 @@ def _from_array(path: Path, data: list[Any]) -> list[list[Array]]:
     if len({person.shape[1] for person in everybody}) > 1:
         raise KeypointsError(f"{path}: landmarks with three numbers and with four")
     values = np.stack(everybody)
-    known = np.isfinite(values).all(axis=2)
-    places = values[known][:, :2]
-    if not len(places):
-        raise KeypointsError(f"{path}: no person in any frame")
-    if np.median(np.abs(places)) > _LARGEST_FRACTION:
-        raise KeypointsError(
-            f"{path}: an array with coordinates up to {np.abs(places).max():.0f}, which are no fractions of "
-            'the picture; pass pixels to memo.Keypoints.from_arrays(points, names="MEDIAPIPE_33")'
-        )
-    hips = values[:, _HIPS, :2].mean(axis=1)
-    if np.nanmax(np.abs(hips), initial=0) < _AT_ORIGIN:
-        raise KeypointsError(
-            f"{path}: the hips are at 0 in every frame: these are world landmarks; "
-            "save the landmarks in the picture (pose_landmarks)"
-        )
-    last = values[known][:, -1]
+    _check_fractions(path, values)
+    last = values[np.isfinite(values).all(axis=2)][:, -1]
     is_share = last.any() and last.min() >= 0 and last.max() <= 1
     if last.any() and not is_share and (values.shape[2] == 4 or last.min() >= 0):
         raise KeypointsError(
@@ -168,9 +185,23 @@ def _row_values(person: Any, where: str) -> Array:
     return values
 
 
-def _values(landmarks: Any, image_size: tuple[int, int], where: str) -> Array:
-    if isinstance(landmarks, np.ndarray):
-        return with_missing(landmarks * (*image_size, 1) - (0.5, 0.5, 0), where)
+def _from_objects(path: Path, data: list[Any]) -> list[list[Array]]:
+    """The people of each entry, (33, 3) each: x, y and visibility."""
+    entries = []
+    for frame, entry in enumerate(data):
+        where = f"{path}: entry {frame}"
+        found = _people(entry)
+        if found is None:
+            got = ", ".join(entry) if isinstance(entry, dict) else short(entry)
+            raise KeypointsError(f"{where}: wanted one of {', '.join(_RESULTS)}, or a list; got {short(got)}")
+        entries.append(
+            [_values(landmarks, f"{where}, person {place}") for place, landmarks in enumerate(found)]
+        )
+    _check_fractions(path, np.stack([person for people in entries for person in people]))
+    return entries
+
+
+def _values(landmarks: Any, where: str) -> Array:
     if not isinstance(landmarks, list) or len(landmarks) != _LANDMARKS:
         got = f"{len(landmarks)}" if isinstance(landmarks, list) else short(landmarks)
         raise KeypointsError(f"{where}: wanted {_LANDMARKS} landmarks, got {got}")
@@ -181,11 +212,15 @@ def _values(landmarks: Any, image_size: tuple[int, int], where: str) -> Array:
             raise KeypointsError(f"{place}: wanted x and y, got {short(landmark)}")
         visibility = landmark.get("visibility")
         values[index] = (
-            _number(landmark["x"], f"{place}, x") * image_size[0] - 0.5,
-            _number(landmark["y"], f"{place}, y") * image_size[1] - 0.5,
+            _number(landmark["x"], f"{place}, x"),
+            _number(landmark["y"], f"{place}, y"),
             1.0 if visibility is None else _number(visibility, f"{place}, visibility"),
         )
-    return with_missing(values, where)
+    return values
+
+
+def _in_pixels(values: Array, image_size: tuple[int, int], where: str) -> Array:
+    return with_missing(values * (*image_size, 1) - (0.5, 0.5, 0), where)
 
 
 def _number(value: Any, where: str) -> float:
