@@ -145,8 +145,11 @@ PARTS = {
 """Names as users of DeepLabCut and SLEAP choose them, and the joints they are."""
 
 
-def deeplabcut(path, individuals=("person1",)):
-    """As DeepLabCut writes its predictions, CSV or H5: `DataFrame.to_csv`, `DataFrame.to_hdf`."""
+def deeplabcut(path, individuals=("person1",), change=lambda table: table):
+    """As DeepLabCut writes its predictions, CSV or H5: `DataFrame.to_csv`, `DataFrame.to_hdf`.
+
+    `change` makes another table of it.
+    """
     import pandas
 
     points, scores = walker([joint or "mark" for joint in PARTS.values()])
@@ -157,7 +160,7 @@ def deeplabcut(path, individuals=("person1",)):
         del levels["individuals"]
     levels["coords"] = ["x", "y", "likelihood"]
     columns = pandas.MultiIndex.from_product(levels.values(), names=list(levels))
-    table = pandas.DataFrame(values, columns=columns)
+    table = change(pandas.DataFrame(values, columns=columns))
     if path.suffix == ".h5":
         table.to_hdf(path, key="df_with_missing", format="table", mode="w")
     else:

@@ -197,6 +197,28 @@ def test_variants_of_yolo_sleap_and_deeplabcut(tmp_path):
     assert np.allclose(read.points, points) and np.allclose(read.scores, scores)
 
 
+@pytest.mark.parametrize("ending", [".csv", ".h5"])
+def test_deeplabcut_tables_in_space_and_of_several_scorers_are_refused(tmp_path, ending):
+    pytest.importorskip("h5py")
+    pandas = pytest.importorskip("pandas")
+    path = tmp_path / f"walk{ending}"
+
+    def with_bob(factor):
+        """The columns of two scorers side by side."""
+        return lambda table: pandas.concat(
+            [table, table.rename(columns={"DLC_resnet50": "bob"}) * factor], axis=1
+        )
+
+    made.deeplabcut(path, change=lambda table: table.rename(columns={"likelihood": "z"}))  # `triangulate`
+    with pytest.raises(memo.keypoints.KeypointsError, match="points in space, not image points"):
+        memo.read_keypoints(path, fps=30)
+    made.deeplabcut(path, change=with_bob(2))
+    with pytest.raises(memo.keypoints.KeypointsError, match=r"of 2 scorers \(DLC_resnet50, bob\); keep"):
+        memo.read_keypoints(path, fps=30)
+    points, _ = made.deeplabcut(path, change=with_bob(np.nan))
+    assert np.allclose(memo.read_keypoints(path, fps=30).points, points)
+
+
 def test_numbers_of_frames_are_kept_where_the_first_one_is_0_or_they_are_of_images(tmp_path):
     made.yolo_labels(tmp_path / "labels")
     (tmp_path / "images").mkdir()

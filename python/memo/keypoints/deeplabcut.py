@@ -5,6 +5,8 @@ The first rows, or the levels of the columns, are `scorer`, perhaps `individuals
 end. Individuals are people. Source: DeepLabCut/DeepLabCut `docs/standardDeepLabCut_UserGuide.md`; H5 is the
 table `df_with_missing` that its `DataFrame.to_hdf(..., format="table")` writes.
 
+Tables of points in space (`triangulate`) are refused, and so are labels of several scorers.
+
 Body parts have the names of the project's `config.yaml`. Those that are joints of memo in any usual
 spelling are kept (`rightknee`, `RKnee`); others are left out.
 """
@@ -151,8 +153,13 @@ def _people(
     """The individuals in a table with columns (scorer, [individual,] body part, coordinate)."""
     if len(set(frames)) < len(frames):
         raise KeypointsError(f"{path}: two rows of one frame")
+    if any(column[-1] == "z" for column in columns):
+        raise KeypointsError(f"{path}: coords x, y and z: these are points in space, not image points")
+    scorer = _scorer(path, columns, values)
     places = {
-        (column[1] if has_individuals else "", column[-2], column[-1]): i for i, column in enumerate(columns)
+        (column[1] if has_individuals else "", column[-2], column[-1]): i
+        for i, column in enumerate(columns)
+        if column[0] == scorer
     }
     parts = list(dict.fromkeys(part for _, part, _ in places))
     joints = known_joints(path, parts)
@@ -171,6 +178,24 @@ def _people(
                 values_of = with_missing(one, f"{path}: frame {frame}")
                 people.append(Person(frame, values_of, None, individual or None))
     return Found(Source(path, None), people, names=tuple(joints.values()), frames=tuple(frames))
+
+
+def _scorer(path: Path, columns: list[tuple[str, ...]], values: Array) -> str | None:
+    """The only scorer with points, or the first one if none has any; several are refused."""
+    scorers = dict.fromkeys(column[0] for column in columns)
+    used = [
+        scorer
+        for scorer in scorers
+        if any(
+            column[0] == scorer and column[-1] in ("x", "y") and np.isfinite(values[:, index]).any()
+            for index, column in enumerate(columns)
+        )
+    ]
+    if len(used) > 1:
+        raise KeypointsError(
+            f"{path}: points of {len(used)} scorers ({short(', '.join(used))}); keep the columns of one"
+        )
+    return next(iter([*used, *scorers]), None)
 
 
 def known_joints(path: Path, names: Sequence[str]) -> dict[str, str]:
