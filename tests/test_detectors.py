@@ -219,6 +219,43 @@ def test_deeplabcut_tables_in_space_and_of_several_scorers_are_refused(tmp_path,
     assert np.allclose(memo.read_keypoints(path, fps=30).points, points)
 
 
+@pytest.mark.parametrize("ending", [".csv", ".h5"])
+def test_deeplabcut_labels_of_two_videos_are_refused(tmp_path, ending):
+    pytest.importorskip("h5py")
+    pytest.importorskip("pandas")
+
+    def labelled(*videos):
+        """The labels of images that were taken from these videos in turn."""
+        images = [
+            f"labeled-data/{videos[frame % len(videos)]}/img{7 * frame:03d}.png"
+            for frame in range(made.FRAMES)
+        ]
+        return lambda table: table.drop(columns="likelihood", level="coords").set_axis(images)
+
+    path = tmp_path / f"CollectedData_anna{ending}"
+    points, _ = made.deeplabcut(path, change=labelled("walk1"))
+    read = memo.read_keypoints(path, fps=30)
+    assert read.frames[-1] == 133 and np.allclose(read.points[::7], points)
+    made.deeplabcut(path, change=labelled("walk1", "walk2"))
+    with pytest.raises(
+        memo.keypoints.KeypointsError, match=r"img000.png and .*walk2/img007.png differ by more"
+    ):
+        memo.read_keypoints(path, fps=30)
+
+
+def test_sleap_tables_of_two_videos_are_refused(tmp_path):
+    made.sleap_csv(tmp_path / "sleap.csv")
+    header, *rows = (tmp_path / "sleap.csv").read_text().splitlines()
+    one = [f"{header},video_path", *(f"{row},a.mp4" for row in rows)]
+    (tmp_path / "one.csv").write_text("\n".join(one))
+    assert len(memo.read_keypoints(tmp_path / "one.csv", fps=30).frames) == made.FRAMES
+    (tmp_path / "two.csv").write_text("\n".join([*one, *(f"{row},b.mp4" for row in rows)]))
+    with pytest.raises(
+        memo.keypoints.KeypointsError, match=r"video_path: a.mp4 and b.mp4; export each video"
+    ):
+        memo.read_keypoints(tmp_path / "two.csv", fps=30)
+
+
 def test_numbers_of_frames_are_kept_where_the_first_one_is_0_or_they_are_of_images(tmp_path):
     made.yolo_labels(tmp_path / "labels")
     (tmp_path / "images").mkdir()

@@ -415,6 +415,40 @@ def test_alphapose_is_read_and_written(tmp_path):
     assert written == entries
 
 
+@pytest.mark.parametrize(
+    ("images", "message"),
+    [
+        (["camA_0000.jpg", "camB_0000.jpg"], "camA_0000.jpg and camB_0000.jpg are both frame 0; one camera"),
+        (
+            ["cam1_0000.jpg", "cam2_0001.jpg"],
+            "cam1_0000.jpg and cam2_0001.jpg differ by more than the number",
+        ),
+        (
+            ["a/0000.jpg", "b/0001.jpg"],
+            "a/0000.jpg and b/0001.jpg differ by more than the number of the frame",
+        ),
+        (["walk_9.jpg", "walk_10.jpg"], None),
+        (["000009.jpg", "000010.jpg", "000010.jpg"], None),
+    ],
+)
+def test_one_list_is_of_one_camera(tmp_path, images, message):
+    path = tmp_path / "alphapose-results.json"
+    person = figure(layouts()["COCO_17"])
+    entries = [
+        {"image_id": image, "category_id": 1, "keypoints": triples(person), "score": 2.5} for image in images
+    ]
+    path.write_text(json.dumps(entries))
+    if message is None:
+        assert read_keypoints(path, fps=30).frames.tolist() == [9, 10]
+        return
+    with pytest.raises(KeypointsError, match=message) as error:
+        read_keypoints(path, fps=30)
+    assert str(path) in str(error.value) and one_line(error)
+    path.write_text(json.dumps({image: openpose_frame(person) for image in images}))  # --format open
+    with pytest.raises(KeypointsError, match=message):
+        read_keypoints(path, fps=30)
+
+
 def test_coco_annotations_keep_their_visibility(tmp_path):
     names = layouts()["COCO_17"]
     values = figure(names)

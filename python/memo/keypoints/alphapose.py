@@ -13,7 +13,15 @@ from typing import Any
 from memo.keypoints.found import Found, Person, check_all_placed
 from memo.keypoints.openpose import change_person, frame_people
 from memo.keypoints.points import MAX_FRAME, Keypoints, KeypointsError, Source
-from memo.keypoints.text import content_of, json_text, last_number, parsed, short, write_text
+from memo.keypoints.text import (
+    check_one_series,
+    content_of,
+    json_text,
+    last_number,
+    parsed,
+    short,
+    write_text,
+)
 
 __all__ = ["image_number", "is_by_image", "read_by_image"]
 
@@ -41,12 +49,7 @@ def read_by_image(path: Path, data: dict[str, Any]) -> Found:
     for image, frame_data in data.items():
         where = f"{path}: {short(image)}"
         frame = image_number(image, where)
-        if frame in names:
-            raise KeypointsError(
-                f"{path}: {short(names[frame])} and {short(image)} are both frame {frame}; "
-                "one camera per file"
-            )
-        names[frame] = image
+        check_one_series(path, names, frame, image)
         for place, values in frame_people(frame_data, where):
             people.append(Person(frame, values, (image, place)))
     return Found(Source(path, _write_by_image), people, frames=tuple(names))

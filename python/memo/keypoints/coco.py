@@ -1,8 +1,8 @@
 """COCO: results, a list of `{image_id, keypoints, score}`, and annotations, an object with `annotations`.
 
 The visibility 0, 1, 2 of annotations becomes the score 0, 0.5, 1. The number of an image, or the last number
-in its name, is the frame number. Written files are results with the 17 COCO points, whatever the source of
-the points; they hold no frame rate.
+in its name, is the frame number; names of images of several cameras or videos are refused. Written files are
+results with the 17 COCO points, whatever the source of the points; they hold no frame rate.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from memo.keypoints.found import (
 )
 from memo.keypoints.layout import in_layout
 from memo.keypoints.points import Keypoints, KeypointsError, Source
-from memo.keypoints.text import content_of, json_text, parsed, write_text
+from memo.keypoints.text import check_one_series, content_of, json_text, parsed, write_text
 
 __all__ = ["read_coco", "write_coco"]
 
@@ -38,6 +38,7 @@ def read_coco(path: Path, data: Any) -> Found:
         raise KeypointsError(f"{path}: one frame of OpenPose; give the folder of all frames")
     is_annotations = isinstance(data, dict)
     people = []
+    images: dict[int, str] = {}
     for place, entry in enumerate(_entries(path, data)):
         where = f"{path}: entry {place}"
         if not isinstance(entry, dict) or "image_id" not in entry or "keypoints" not in entry:
@@ -45,8 +46,11 @@ def read_coco(path: Path, data: Any) -> Found:
         values = triples(entry["keypoints"], f"{where}, keypoints")
         if is_annotations:
             values[:, 2] /= 2
+        frame = image_number(entry["image_id"], where)
+        if isinstance(entry["image_id"], str):
+            check_one_series(path, images, frame, entry["image_id"])
         if len(values):
-            people.append(Person(image_number(entry["image_id"], where), values, place))
+            people.append(Person(frame, values, place))
     size = _image_size(data.get("images")) if is_annotations else None
     return Found(
         Source(path, _write_annotations if is_annotations else _write_results), people, image_size=size

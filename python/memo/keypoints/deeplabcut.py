@@ -25,7 +25,7 @@ from memo import _memo
 from memo.keypoints.found import Found, Person, with_missing
 from memo.keypoints.hdf5 import opened
 from memo.keypoints.points import MAX_FRAME, Array, KeypointsError, Source
-from memo.keypoints.text import last_number, short
+from memo.keypoints.text import check_one_series, last_number, short
 from memo.spreadsheet import CsvRows, Error
 from memo.wording import counted
 
@@ -64,6 +64,7 @@ def read_deeplabcut(path: Path, content: str) -> Found:
         for column in zip(*(levels[name][indexed:] for name in _LEVELS if name in levels), strict=True)
     ]
     frames, values = [], []
+    images: dict[int, str] = {}
     for number, row in enumerate(rows[count:], start=count + 1):
         if len(row) != indexed + len(columns):
             raise KeypointsError(
@@ -73,7 +74,7 @@ def read_deeplabcut(path: Path, content: str) -> Found:
             values.append([float(cell) if cell.strip() else np.nan for cell in row[indexed:]])
         except ValueError:
             raise KeypointsError(f"{path}: row {number}: a cell is not a number") from None
-        frames.append(_frame(row[indexed - 1], f"{path}: row {number}"))
+        frames.append(_frame(path, "/".join(row[:indexed]), f"{path}: row {number}", images))
     table = np.array(values, np.float64).reshape(len(values), len(columns))
     return _people(path, columns, "individuals" in levels, frames, table)
 
@@ -110,9 +111,13 @@ def read_deeplabcut_h5(path: Path) -> Found:
             f"{path}: {counted(len(columns), 'name')} of columns for numbers of shape {values.shape}"
         )
     index = rows["index"] if "index" in rows.dtype.names else np.arange(len(rows))
+    images: dict[int, str] = {}
     frames = [
         _frame(
-            one.decode("utf-8", "replace") if isinstance(one, bytes) else str(one), f"{path}: row {number}"
+            path,
+            one.decode("utf-8", "replace") if isinstance(one, bytes) else str(one),
+            f"{path}: row {number}",
+            images,
         )
         for number, one in enumerate(index.tolist())
     ]
@@ -140,10 +145,13 @@ def _unpickled(content: bytes, path: Path) -> Sequence[Any]:
     return found
 
 
-def _frame(text: str, where: str) -> int:
+def _frame(path: Path, text: str, where: str, images: dict[int, str]) -> int:
+    """The frame of a row, from its number or the path of its image, which `images` collects."""
     frame = last_number(text.rpartition(".")[0] if "." in text and not text.isdecimal() else text)
     if frame is None or frame > MAX_FRAME:
         raise KeypointsError(f"{where}: {short(text)} has no frame number")
+    if not text.strip().isdecimal():
+        check_one_series(path, images, frame, text)
     return frame
 
 

@@ -4,7 +4,7 @@
   another order that the attribute `dims` of each data set gives. Source: talmolab/sleap
   `sleap/info/write_tracking_h5.py`, talmolab/sleap-io `sleap_io/io/analysis_h5.py`.
 - CSV: a row per frame and track, `track`, `frame_idx`, `instance.score`, and `NODE.x`, `NODE.y`,
-  `NODE.score`. Source: talmolab/sleap-io `sleap_io/io/csv.py`.
+  `NODE.score`, perhaps the video, of which there must be one. Source: talmolab/sleap-io `sleap_io/io/csv.py`.
 
 Tracks are people. Nodes that are joints of memo in any usual spelling are kept; others are left out. A
 project (`.slp`) is not read: export the analysis.
@@ -29,6 +29,7 @@ __all__ = ["is_sleap", "is_sleap_h5", "read_sleap", "read_sleap_h5"]
 
 _TRACKS = ("track", "xy", "node", "frame")  # SLEAP's own order
 _SCORES = ("track", "node", "frame")
+_VIDEO = ("video", "video_path", "video_name", "video_idx")
 
 
 def is_sleap(content: str) -> bool:
@@ -46,10 +47,12 @@ def read_sleap(path: Path, content: str) -> Found:
     if lacking:
         raise KeypointsError(f"{path}: no column {', '.join(lacking)}")
     people = []
+    videos: dict[str, str] = {}
     for number, row in enumerate(rows[1:], start=2):
         where = f"{path}: row {number}"
         if len(row) != len(rows[0]):
             raise KeypointsError(f"{where} has {counted(len(row), 'cell')}, the header {len(rows[0])}")
+        _check_one_video(path, videos, {name: row[places[name]].strip() for name in _VIDEO if name in places})
 
         def value(column: str, row: list[str] = row, where: str = where) -> float:
             try:
@@ -69,6 +72,16 @@ def read_sleap(path: Path, content: str) -> Found:
             track = row[places["track"]].strip() if "track" in places else ""
             people.append(Person(int(frame), with_missing(values, where), None, track or None))
     return Found(Source(path, None), people, names=tuple(joints.values()))
+
+
+def _check_one_video(path: Path, videos: dict[str, str], cells: dict[str, str]) -> None:
+    """Refuses a row of another video than those before, whose columns `videos` collects."""
+    for column, video in cells.items():
+        first = videos.setdefault(column, video)
+        if first != video:
+            raise KeypointsError(
+                f"{path}: {column}: {short(first)} and {short(video)}; export each video to its own file"
+            )
 
 
 def is_sleap_h5(file: Any) -> bool:

@@ -11,7 +11,15 @@ from memo.files import read_text
 from memo.keypoints.points import KeypointsError
 from memo.unfinished import write_complete
 
-__all__ = ["content_of", "json_text", "last_number", "parsed", "short", "write_text"]
+__all__ = [
+    "check_one_series",
+    "content_of",
+    "json_text",
+    "last_number",
+    "parsed",
+    "short",
+    "write_text",
+]
 
 MAX_FRAME_FILE_BYTES = 64 << 20
 MAX_FILE_BYTES = 512 << 20
@@ -57,6 +65,30 @@ def last_number(text: str) -> int | None:
     """The last number in a name: the frame number, if it is at most `MAX_FRAME`."""
     digits = re.findall(r"[0-9]+", text)
     return int(digits[-1]) if digits and len(digits[-1]) <= _MOST_DIGITS else None
+
+
+def check_one_series(path: Path, names: dict[int, str], frame: int, name: str) -> None:
+    """Adds the image of a frame to those before; refuses one that is not of their camera or video.
+
+    Images of one camera have names that differ by the last number alone, that of the frame.
+    """
+    first = next(iter(names.values()), name)
+    other = names.setdefault(frame, name)
+    if other != name:
+        raise KeypointsError(
+            f"{path}: {short(other)} and {short(name)} are both frame {frame}; one camera per file"
+        )
+    if _without_frame(first) != _without_frame(name):
+        raise KeypointsError(
+            f"{path}: {short(first)} and {short(name)} differ by more than the number of the frame; "
+            "one camera and one video per file"
+        )
+
+
+def _without_frame(name: str) -> str:
+    """The name of an image without its ending and the number of its frame."""
+    stem = name.rpartition(".")[0] or name
+    return re.sub(r"[0-9]+(?=[^0-9]*$)", "*", stem, count=1)
 
 
 def short(value: Any) -> str:
