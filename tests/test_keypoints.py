@@ -473,6 +473,85 @@ def test_coco_annotations_keep_their_visibility(tmp_path):
     assert json.loads((tmp_path / "out.json").read_text()) == data
 
 
+def annotations(people, names=None, **category):
+    """COCO annotations of one person per image, as labelling programs export them."""
+    own = {"id": 1, "name": "person", "supercategory": "person", "skeleton": [], **category}
+    return {
+        "images": [
+            {"id": t, "width": 640, "height": 480, "file_name": f"{t}.png"} for t in range(len(people))
+        ],
+        "annotations": [
+            {"id": t, "image_id": t, "category_id": own["id"], "keypoints": triples(person)}
+            for t, person in enumerate(people)
+        ],
+        "categories": [own if names is None else own | {"keypoints": list(names)}],
+    }
+
+
+def test_the_names_of_points_in_coco_annotations_count(tmp_path):
+    path = tmp_path / "walk.json"
+    coco = layouts()["COCO_17"]
+    people = np.array([figure(coco, 100 + 8 * t, seed=t) for t in range(4)])
+    people[..., 2] = 2
+    path.write_text(json.dumps(annotations(people, coco)))
+    assert read_keypoints(path, fps=25).layout == "COCO_17"
+    order = [*range(16, -1, -1)]
+    names = [coco[k] for k in order]
+    names[2], names[-1] = "tail", "Nose"
+    path.write_text(json.dumps(annotations(people[:, order], names)))
+    found = read_keypoints(path, fps=25)
+    joints = tuple(name for name in coco[::-1] if name != coco[order[2]])
+    assert found.names == joints and found.layout is None
+    for name in ("nose", "right_ankle"):
+        at = people[:, coco.index(name), :2]
+        np.testing.assert_array_equal(found.points[:, joints.index(name)], at)
+    found.write(tmp_path / "same.json")
+    assert (tmp_path / "same.json").read_text() == path.read_text()
+    points = found.points.copy()
+    points[1, joints.index("nose")] = 7, 9
+    found.replaced(points, found.scores).write(tmp_path / "out.json")
+    wanted = json.loads(path.read_text())
+    wanted["annotations"][1]["keypoints"][-3:] = [7, 9, 2]
+    assert json.loads((tmp_path / "out.json").read_text()) == wanted
+    path.write_text(json.dumps(annotations(people, [f"kp{k}" for k in range(17)])))
+    assert read_keypoints(path, fps=25).layout == "COCO_17"
+    for names, message in (
+        (coco[:5], "entry 0, keypoints: 17 points, and the category names 5"),
+        (["left_knee", "LKnee", *coco[2:]], "names of different joints"),
+    ):
+        path.write_text(json.dumps(annotations(people, names)))
+        with pytest.raises(KeypointsError, match=message):
+            read_keypoints(path, fps=25)
+
+
+def test_only_the_people_among_the_categories_of_coco_count(tmp_path):
+    path = tmp_path / "a.json"
+    names = layouts()["COCO_17"]
+    people = np.array([figure(names, 100 + 8 * t, seed=t) for t in range(4)])
+    dogs = [
+        {"image_id": t, "category_id": 17, "keypoints": triples(2 * figure(names, 300)), "score": 0.9}
+        for t in range(6)
+    ]
+    results = [
+        {"image_id": t, "category_id": 1, "keypoints": triples(person), "score": 0.9}
+        for t, person in enumerate(people)
+    ]
+    path.write_text(json.dumps([*dogs, *results]))
+    found = read_keypoints(path, fps=25)
+    np.testing.assert_array_equal(found.points[:4], people[..., :2])
+    assert found.people.tolist() == [1, 1, 1, 1, 0, 0]
+    data = annotations(people, id=3)
+    data["annotations"] += dogs
+    data["categories"].append({"id": 17, "name": "dog"})
+    path.write_text(json.dumps(data))
+    np.testing.assert_array_equal(read_keypoints(path, fps=25).points[:4], people[..., :2])
+    path.write_text(json.dumps(dogs))  # whatever the number, if there is only one
+    assert read_keypoints(path, fps=25).people.tolist() == 6 * [1]
+    path.write_text(json.dumps([*dogs, *({**one, "category_id": 2} for one in results)]))
+    with pytest.raises(KeypointsError, match="categories 17, 2, of which none is `person`; keep the entries"):
+        read_keypoints(path, fps=25)
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [

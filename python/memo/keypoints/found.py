@@ -68,10 +68,22 @@ def with_missing(values: Array, where: str) -> Array:
 
 
 def with_points(
-    numbers: Any, keypoints: Keypoints, row: int, where: str, factor: int = 1
+    numbers: Any,
+    keypoints: Keypoints,
+    row: int,
+    where: str,
+    factor: int = 1,
+    kept: tuple[int, ...] | None = None,
 ) -> list[Any] | None:
-    """The numbers with the points of a row; unchanged numbers keep their digits; None if nothing changed."""
+    """The numbers with the points of a row; unchanged numbers keep their digits; None if nothing changed.
+
+    `kept`: the places of the joints among the points, if they are not all of them in their order.
+    """
     before = triples(numbers, where)
+    places = range(len(before)) if kept is None else kept
+    if max(places, default=-1) >= len(before):
+        raise KeypointsError(f"{where}: has changed since it was read")
+    before = before[list(places)]
     before[:, 2] /= factor
     after = np.column_stack([keypoints.points[row], keypoints.scores[row]])
     if before.shape != after.shape:
@@ -81,9 +93,10 @@ def with_points(
     for joint in joints:
         x, y, score = after[joint].tolist()
         if math.isnan(x) or math.isnan(y):
-            changed[3 * joint : 3 * joint + 3] = [0, 0, 0]
+            new = [0, 0, 0]
         else:
-            changed[3 * joint : 3 * joint + 3] = [x, y, round(score * factor) if factor > 1 else score]
+            new = [x, y, round(score * factor) if factor > 1 else score]
+        changed[3 * places[joint] : 3 * places[joint] + 3] = new
     return changed if len(joints) else None
 
 

@@ -151,7 +151,7 @@ def _layout(found: Found, layout: str | None, points: Array) -> tuple[str | None
     path = found.source.path
     if found.names is not None:
         if layout is not None:
-            raise KeypointsError(f"{path}: a table names its joints; leave the layout {layout} out")
+            raise KeypointsError(f"{path}: the file names its joints; leave the layout {layout} out")
         return None, found.names
     try:
         name, names = _memo.keypoint_layout(_memo.guess_layout(points) if layout is None else layout)
