@@ -256,6 +256,14 @@ def test_sleap_tables_of_two_videos_are_refused(tmp_path):
         memo.read_keypoints(tmp_path / "two.csv", fps=30)
 
 
+def test_a_track_of_sleap_twice_in_a_frame_is_refused(tmp_path):
+    made.sleap_csv(tmp_path / "sleap.csv")
+    lines = (tmp_path / "sleap.csv").read_text().splitlines()
+    (tmp_path / "sleap.csv").write_text("\n".join([*lines, lines[4]]))
+    with pytest.raises(memo.keypoints.KeypointsError, match="person track_0 appears twice in frame 3"):
+        memo.read_keypoints(tmp_path / "sleap.csv", fps=30)
+
+
 def test_numbers_of_frames_are_kept_where_the_first_one_is_0_or_they_are_of_images(tmp_path):
     made.yolo_labels(tmp_path / "labels")
     (tmp_path / "images").mkdir()
@@ -307,6 +315,12 @@ def test_confidences_are_no_tracks_and_json_has_tracks_too(tmp_path):
         file.write_text(file.read_text().strip() + (" 1\n" if file.stem == "walk_3" else " 0.91\n"))
     read = memo.read_keypoints(tmp_path / "labels", fps=30, image_size=made.SIZE)
     assert [one.name for one in read.everyone] == ["0"]
+    for file in (tmp_path / "labels").iterdir():  # two people, each as certain as can be
+        cells = file.read_text().split()[:-1]
+        other = [*cells[:5], *(f"{float(cell) * 0.4:g}" for cell in cells[5:])]
+        file.write_text(f"{' '.join(cells)} 1\n{' '.join(other)} 1\n")
+    read = memo.read_keypoints(tmp_path / "labels", fps=30, image_size=made.SIZE)
+    assert [(one.name, one.frames) for one in read.everyone] == [("0", 19), ("1", 19)]
     points, _ = made.yolo_json(tmp_path / "yolo.json")
     frames = json.loads((tmp_path / "yolo.json").read_text())
     for people in frames:

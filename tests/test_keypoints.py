@@ -668,6 +668,11 @@ def test_tables_of_several_people(tmp_path):
         ("frame,left_knee_x,left_knee_y\n1,2,3\n1,2,3\n", "frame 1 appears twice"),
         ("frame,time_s,left_knee_x,left_knee_y\n1,1,2,3\n2,1,2,3\n", "time_s must increase"),
         ("frame,time_s,left_knee_x,left_knee_y\n1,,2,3\n", "row 2: no time_s"),
+        ("frame,joint,x,y,z\n1,LKN,2,3,4\n", "columns x, y and z: these are points in space"),
+        (
+            "frame,person,LKN_x,LKN_y\n3,a,2,3\n4,a,2,3\n4,b,7,8\n4,a,9,3\n",
+            "person a appears twice in frame 4",
+        ),
         ("frame,joint,x,y\n1,LKN,2,3\n1,left_knee,2,3\n", "row 3: left_knee appears twice in frame 1"),
         ("frame,left_knee_x,left_knee_y\n", "no person in any frame"),
         ("frame,left_knee_x,left_knee_y\n1,2,3\n900000000,2,3\n", "only 2 of them"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from itertools import pairwise
@@ -110,6 +111,7 @@ def _assembled(
     people = sorted(found.people, key=lambda one: one.frame)
     if not people:
         raise KeypointsError(f"{path}: no person in any frame")
+    _check_names(path, people)
     frames = frame_range(path, {one.frame for one in people} | set(found.frames))
     counts = {len(one.values) for one in people}
     if len(counts) > 1:
@@ -145,6 +147,14 @@ def _assembled(
         everyone=everyone,
         doubts=() if isinstance(who, str) else tuple(_doubts(who, met)),
     )
+
+
+def _check_names(path: Path, people: Sequence[Person]) -> None:
+    """Refuses a person of one name at two places in a frame."""
+    named = Counter((one.frame, one.name) for one in people if one.name is not None)
+    twice = next((each for each, count in named.items() if count > 1), None)
+    if twice is not None:
+        raise KeypointsError(f"{path}: person {twice[1]} appears twice in frame {twice[0]}")
 
 
 def _layout(found: Found, layout: str | None, points: Array) -> tuple[str | None, tuple[str, ...]]:

@@ -132,6 +132,8 @@ def _columns(path: Path, rows: list[list[str]]) -> Columns:
     if frame is None and time_s is None:
         raise KeypointsError(f"{path}: a table of keypoints needs a column `frame` or `time_s`")
     if all(name in lower for name in _LONG_COLUMNS):
+        if "z" in lower:
+            raise KeypointsError(f"{path}: columns x, y and z: these are points in space, not image points")
         joint, x, y = (lower[name] for name in _LONG_COLUMNS)
         spelt = dict.fromkeys(row[joint] for row in rows[1:] if row)
         names = tuple(dict.fromkeys(name for text in spelt if (name := joint_of(path, text)) is not None))

@@ -67,7 +67,8 @@ def read_detections(
 def read_labels(path: Path, files: dict[int, Path], image_size: tuple[int, int] | None) -> Found:
     """All people in a folder of label files, by the number of their frame."""
     first = _first_number(files)
-    people, behind = [], []
+    people = []
+    behind: list[list[float]] = []
     for number, file in files.items():
         frame = number - first
         for place, line in enumerate(content_of(file).splitlines(), start=1):
@@ -78,7 +79,7 @@ def read_labels(path: Path, files: dict[int, Path], image_size: tuple[int, int] 
                 values, more = found
                 people.append(Person(frame, _in_pixels(values, path, image_size), None))
                 behind.append(more)
-    people = [replace(one, name=name) for one, name in zip(people, _tracks(behind), strict=True)]
+    people = [replace(one, name=name) for one, name in zip(people, _tracks(people, behind), strict=True)]
     frames = tuple(number - first for number in files)
     return Found(Source(path, None), people, image_size=image_size, frames=frames)
 
@@ -105,13 +106,18 @@ def _of_detection(detection: Any, where: str) -> Array:
     return with_missing(values, where)
 
 
-def _tracks(behind: list[list[float]]) -> list[str | None]:
+def _tracks(people: list[Person], behind: list[list[float]]) -> list[str | None]:
     """The number of each track, from what is behind the points: [], [confidence], [track] or both.
 
-    All lines have the confidence or none has it, and a line has no track while it belongs to none.
+    All lines have the confidence or none has it, and a line has no track while it belongs to none. Whole
+    numbers alone that two lines of a frame share are confidences of 1.
     """
     most = max(map(len, behind), default=0)
-    if most == 0 or (most == 1 and not all(number.is_integer() for more in behind for number in more)):
+    if most == 1:
+        lone = [(one.frame, *more) for one, more in zip(people, behind, strict=True) if more]
+        if len(set(lone)) < len(lone) or not all(number.is_integer() for _, number in lone):
+            most = 0
+    if most == 0:
         return [None] * len(behind)
     return [str(int(more[-1])) if len(more) == most else None for more in behind]
 
