@@ -225,6 +225,7 @@ def track_columns(frames):
     return columns | {
         "frame": np.array(frames),
         "walk": np.zeros(len(frames), np.int64),
+        "person": np.zeros(len(frames), np.int64),
         "time_s": np.array(frames) / 25,
     }
 

@@ -650,6 +650,23 @@ def test_tables_of_several_people(tmp_path):
         read_keypoints(path, fps=10)
 
 
+def test_without_a_choice_the_most_prominent_name_is_read(tmp_path):
+    path = tmp_path / "a.csv"
+    rows = ["frame,person,right_hip_x,right_hip_y,right_ankle_x,right_ankle_y"]
+    for t in range(20):  # they change sides between two frames, as after a cut
+        for name, u, height in (("anna", 300 + t, 300), ("bob", 900 + t, 250)):
+            u = u if t < 10 else 1200 - u
+            rows.append(f"{t},{name},{u},100,{u},{100 + height}")
+    path.write_text("\n".join(rows))
+    found = read_keypoints(path, fps=10)
+    np.testing.assert_array_equal(found.points, read_keypoints(path, fps=10, person="anna").points)
+    assert found.everyone[0].name == "anna" and np.isfinite(found.points).all()
+    rows = ["frame,person,right_hip_x,right_hip_y"]  # one point each has no size
+    rows += [f"{t},{name},{u},50" for t in range(20) for name, u in (("i1", 100 + t), ("i2", 500 - t))]
+    path.write_text("\n".join(rows))
+    assert read_keypoints(path, fps=10).points[:, 0, 0].tolist() == [100 + t for t in range(20)]
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [

@@ -23,7 +23,7 @@ class Person:
     frame: int
     values: Array  # (K, 3): x, y, score
     place: Any
-    #: The person's name in the file, if it names people reliably.
+    #: The person's name in the file, if it names people, or the number of a track.
     name: str | None = None
 
 
@@ -38,6 +38,8 @@ class Found:
     image_size: tuple[int, int] | None = None
     #: Frames in the file, some perhaps without people.
     frames: tuple[int, ...] = ()
+    #: Whether the names are numbers of a tracker, of which one person may have several.
+    are_tracks: bool = False
 
 
 # Numbers x, y, score.

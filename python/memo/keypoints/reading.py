@@ -42,7 +42,8 @@ def read_keypoints(
     track of YOLO; or a place `(u_px, v_px, frame)` where the person is. Frames count from 0, also in files
     whose first one is 1 (labels of YOLO, demos of MMPose). Everyone is followed from frame to frame, whatever
     the order of the detector's lists; who is not found for a while is expected on their way. By default the
-    most prominent person is chosen. `Keypoints.everyone` lists all, `doubts` says where two may be exchanged.
+    most prominent person is chosen, by the name if the file names people (tracks of YOLO are no names: one
+    person may have several). `Keypoints.everyone` lists all, `doubts` says where two may be exchanged.
     `fps` is needed unless a table has `time_s`, which it replaces. `layout` names the order of points if the
     file does not: without it the number of points decides, and between BODY_25 and BODY_25B (both 25) whether
     the points that would be neck and middle of the hips lie there. `image_size`, width and height in pixels,
@@ -121,6 +122,8 @@ def _assembled(
     name, names = _layout(found, layout, all_points)
     numbers, met = _memo.follow_everyone([one.frame for one in people], all_points, all_scores)
     everyone = _everyone(people, _names(people, numbers), all_points, all_scores)
+    if person is None and not found.are_tracks and any(one.name is not None for one in people):
+        person = everyone[0].name
     who = _chosen(path, people, person, numbers, all_points)
     chosen = [name == who for name in (_names(people, numbers) if isinstance(who, str) else numbers)]
 

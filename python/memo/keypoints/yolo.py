@@ -60,7 +60,11 @@ def read_detections(
     if people and all(np.nanmax(one.values[:, :2], initial=0) <= _LARGEST_FRACTION for one in people):
         people = [replace(one, values=_in_pixels(one.values, path, image_size)) for one in people]
     return Found(
-        Source(path, None), people, image_size=image_size, frames=tuple(frame for frame, _, _ in frames)
+        Source(path, None),
+        people,
+        image_size=image_size,
+        frames=tuple(frame for frame, _, _ in frames),
+        are_tracks=True,
     )
 
 
@@ -81,7 +85,7 @@ def read_labels(path: Path, files: dict[int, Path], image_size: tuple[int, int] 
                 behind.append(more)
     people = [replace(one, name=name) for one, name in zip(people, _tracks(people, behind), strict=True)]
     frames = tuple(number - first for number in files)
-    return Found(Source(path, None), people, image_size=image_size, frames=frames)
+    return Found(Source(path, None), people, image_size=image_size, frames=frames, are_tracks=True)
 
 
 def _first_number(files: dict[int, Path]) -> int:
