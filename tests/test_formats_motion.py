@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from memo.files import JOINTS
 from memo.formats import FormatError, GaitEvent, Motion, read_motion, write_motion
 from memo.formats.motion import from_z_up, to_z_up
-from memo.formats.names import joint_points, joints_found
+from memo.formats.names import joint_points, joints_found, mapped_points
 from motions import shared_motion, walk
 
 
@@ -167,6 +167,36 @@ def test_no_motion_is_made_of_what_is_none(parts, says):
 def test_joints_are_known_by_many_spellings(spelled):
     names = ["spare", *(spelled(*joint.split("_")) for joint in JOINTS)]
     assert joints_found(names) == {joint: k for k, joint in enumerate(JOINTS, 1)}
+
+
+def test_joints_of_several_subjects_are_never_one_body(tmp_path):
+    anna = [f"Anna:{name}" for name in JOINTS if name != "left_knee"]
+    names = (*anna, *(f"Bob:{name}" for name in JOINTS), "Wand:W1", "Wand:W2")
+    points = np.arange(2 * len(names) * 3.0).reshape(2, -1, 3)
+    motion = Motion(names, [0, 0.01], points, angles={"right_knee": [5, 6]})
+    with pytest.raises(FormatError, match=r"joints of 2 subjects \(Anna, Bob\), and those of one are wanted"):
+        joint_points(motion)
+    for ending in ("bvh", "mot"):
+        with pytest.raises(FormatError, match=r"2 subjects \(Anna, Bob\)"):
+            write_motion(tmp_path / f"both.{ending}", motion)
+    write_motion(tmp_path / "both.trc", motion)  # of all points, under their own names
+    assert read_motion(tmp_path / "both.trc").names == names
+    with pytest.raises(FormatError, match=r"2 subjects \(Anna, Bob\)"):
+        write_motion(tmp_path / "both.trc", motion, names="pose2sim")
+    bob = {joint: [f"Bob:{joint}"] for joint in JOINTS}
+    assert (mapped_points(names, points, bob)[1] == points[:, 11:23]).all()
+    spelt = {joint: [f"bob:{joint.replace('_', '').upper()}"] for joint in JOINTS}
+    assert (mapped_points(names, points, spelt)[1] == points[:, 11:23]).all()
+    plain = {joint: [joint] for joint in JOINTS}
+    mostly = {joint: [f"Anna:{joint}"] for joint in JOINTS} | {"left_knee": ["left_knee"]}
+    for wanted, example in ((plain, "Anna:right_shoulder"), (mostly, "Anna:left_knee")):
+        with pytest.raises(FormatError, match=rf'2 subjects \(Anna, Bob\): name those .* "{example}"'):
+            mapped_points(names, points, wanted)
+    with pytest.raises(FormatError, match=r"no points for Anna:left_knee \(left_knee\)"):
+        mapped_points(names, points, {joint: [f"Anna:{joint}"] for joint in JOINTS})
+    only = [*(f"Bob:{name}" for name in JOINTS), "Wand:W1", "head"]
+    assert joints_found(only) == {name: k for k, name in enumerate(JOINTS)} | {"head": 13}
+    assert mapped_points(only, points[:, :14], plain)[0][0] == "RSH"
 
 
 def test_a_skeletons_shoulder_is_its_arm_and_no_marker_is_a_joint():

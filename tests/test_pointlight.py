@@ -207,6 +207,9 @@ def test_markers_are_named_by_a_table_and_missing_ones_are_listed(tmp_path, memo
     usual = memo.pointlight(*MOTION).positions_px[0]
     assert float(row["RWR_u_px"]) == pytest.approx(usual[2, 0] + 0.01 * 200, abs=1e-3)
     assert float(row["LKN_v_px"]) == pytest.approx(usual[10, 1], abs=1e-3)
+    (tmp_path / "map.toml").write_bytes(b"\xef\xbb\xbf" + (tmp_path / "map.toml").read_bytes())
+    code, _, err = memo_command(*arguments, "--out", tmp_path / "marked")
+    assert code == 0, err
     (tmp_path / "bad.toml").write_text('right_knee = "RKNE"\nleft_knee = ["m10", "nothing"]\n')
     arguments[3] = tmp_path / "bad.toml"
     code, _, err = memo_command(*arguments, "--out", tmp_path / "bad")

@@ -5,6 +5,9 @@ means different joints in different schemes: `RightShoulder` is the shoulder in 
 the inner end of the collar bone in a BVH file, where the shoulder is called `RightArm`. Plug-in Gait's
 skin markers are not joints and are not used as joints; its virtual points are (`RFEP`, the proximal end of
 the femur, is the hip).
+
+What is before the last colon of a name is its subject ("Anna:RKNE"). The joints of one body are those of one
+subject; files with the joints of several are refused where one body is wanted.
 """
 
 from __future__ import annotations
@@ -104,10 +107,35 @@ _SCHEMES: tuple[dict[str, tuple[str, ...]], ...] = (
 
 
 def joints_found(names: Sequence[str]) -> dict[str, int]:
-    """Indices of memo's joints among the names: the twelve, and head, neck and pelvis if they exist."""
+    """Indices of memo's joints among the names: the twelve, and head, neck and pelvis if they exist.
+
+    Raises `FormatError` if several subjects have joints.
+    """
+    found = _joints_of_subjects(names)
+    if len(found) > 1:
+        raise FormatError(
+            f"joints of {len(found)} subjects ({listed([*found])}), and those of one are wanted"
+        )
+    return next(iter(found.values()))
+
+
+def _joints_of_subjects(names: Sequence[str]) -> dict[str, dict[str, int]]:
+    """The joints of each subject that has any of the twelve, together with the points without a subject.
+
+    If no subject has any, all points are of one whose name is empty.
+    """
+    subjects = dict.fromkeys(subject for name in names if (subject := _subject(name)))
+    bodies = [subject for subject in subjects if not _joints_among(names, subject).keys().isdisjoint(JOINTS)]
+    found = {subject: _joints_among(names, subject, "") for subject in bodies}
+    return found or {"": _joints_among(names, *subjects, "")}
+
+
+def _joints_among(names: Sequence[str], *subjects: str) -> dict[str, int]:
+    """The joints among the points of these subjects, in the scheme in which most are found."""
     plain: dict[str, int] = {}
     for index, name in enumerate(names):
-        plain.setdefault(_letters(name), index)
+        if _subject(name) in subjects:
+            plain.setdefault(_letters(name), index)
     found = [
         {joint: plain[spelled[0]] for joint, names in scheme.items() if (spelled := _those(names, plain))}
         for scheme in _SCHEMES
@@ -118,8 +146,12 @@ def joints_found(names: Sequence[str]) -> dict[str, int]:
 def joint_places(
     names: Sequence[str], markers: Mapping[str, Sequence[str]] | None = None
 ) -> dict[str, list[int]]:
-    """Indices of the points at whose mean each joint is: as in `markers`, and else by its usual names."""
-    usual = {joint: [index] for joint, index in joints_found(names).items()}
+    """Indices of the points at whose mean each joint is: as in `markers`, and else by its usual names.
+
+    Of several subjects the one with the most joints is taken.
+    """
+    most = max(_joints_of_subjects(names).values(), key=len)
+    usual = {joint: [index] for joint, index in most.items()}
     place = _finder(names)
     found = {joint: [place(name) for name in wanted] for joint, wanted in (markers or {}).items()}
     known = {joint: [k for k in places if k is not None] for joint, places in found.items()}
@@ -192,7 +224,7 @@ def read_marker_map(path: Path) -> dict[str, tuple[str, ...]]:
     The joints have memo's names. Raises `FormatError` for joints that memo does not know.
     """
     try:
-        text = path.read_text("utf-8")
+        text = path.read_text("utf-8-sig")
     except OSError as error:
         raise FormatError(f"{path}: cannot be read: {error.strerror or error}") from None
     except UnicodeDecodeError as error:
@@ -246,9 +278,10 @@ def mapped_points(
     """Names of joints and their points (T, K, D), each the mean of its markers, NaN where one is missing.
 
     The joints have memo's short names. Raises `FormatError` for markers that do not exist; a marker may be
-    named without its subject ("RKNE" for "Anna:RKNE") and in any case.
+    named without its subject ("RKNE" for "Anna:RKNE") and in any case, if only one subject has the markers.
     """
     place = _finder(names)
+    _check_one_subject(names, [name for wanted in markers.values() for name in wanted])
     absent = [
         f"{name} ({joint})" for joint, wanted in markers.items() for name in wanted if place(name) is None
     ]
@@ -260,16 +293,52 @@ def mapped_points(
 
 
 def _finder(names: Sequence[str]) -> Callable[[str], int | None]:
-    """A function that gives the index of a name: exactly, or else by its letters."""
+    """A function that gives the index of a name: exactly, or else by its letters.
+
+    If the points have subjects, a name with a subject is only that subject's.
+    """
     exact = {name: index for index, name in reversed(list(enumerate(names)))}
     plain = {_letters(name): index for index, name in reversed(list(enumerate(names)))}
-    return lambda name: exact.get(name, plain.get(_letters(name)))
+    own = {(_subject(name).lower(), _letters(name)): index for name, index in exact.items()}
+    have_subjects = any(map(_subject, names))
+
+    def place(name: str) -> int | None:
+        if name in exact:
+            return exact[name]
+        if _subject(name) and have_subjects:
+            return own.get((_subject(name).lower(), _letters(name)))
+        return plain.get(_letters(name))
+
+    return place
+
+
+def _check_one_subject(names: Sequence[str], wanted: Sequence[str]) -> None:
+    """Refuses markers named without their subject if several subjects have markers of these names."""
+    place = _finder(names)
+    implied = [name for name in wanted if name not in names and not _subject(name)]
+    letters = {_letters(name) for name in implied}
+    places = {place(name) for name in wanted if name not in implied}
+    subjects = dict.fromkeys(
+        subject
+        for index, name in enumerate(names)
+        if (subject := _subject(name)) and (index in places or _letters(name) in letters)
+    )
+    if implied and len(subjects) > 1:
+        raise FormatError(
+            f"markers of {len(subjects)} subjects ({listed([*subjects])}): name those of one, such as "
+            f'"{next(iter(subjects))}:{implied[0]}"'
+        )
 
 
 def listed(names: Sequence[str], most: int = 40) -> str:
     """Names for a message, limited in number."""
     shown = ", ".join(names[:most]) or "none"
     return shown + (f" and {len(names) - most} more" if len(names) > most else "")
+
+
+def _subject(name: str) -> str:
+    """What is before the last colon of a name: its subject; empty without one."""
+    return name.rpartition(":")[0].strip()
 
 
 def _letters(name: str) -> str:
