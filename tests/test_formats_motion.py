@@ -169,6 +169,13 @@ def test_joints_are_known_by_many_spellings(spelled):
     assert joints_found(names) == {joint: k for k, joint in enumerate(JOINTS, 1)}
 
 
+def test_masked_numbers_of_a_motion_are_missing():
+    values = np.arange(6.0).reshape(2, 1, 3)
+    motion = Motion(("a",), [0, 1], np.ma.masked_equal(values, 4), angles={"b": np.ma.masked_less([1, 9], 5)})
+    assert np.isnan(motion.points[1]).all() and np.isfinite(motion.points[0]).all()
+    np.testing.assert_array_equal(motion.angles["b"], [np.nan, 9])
+
+
 def test_joints_of_several_subjects_are_never_one_body(tmp_path):
     anna = [f"Anna:{name}" for name in JOINTS if name != "left_knee"]
     names = (*anna, *(f"Bob:{name}" for name in JOINTS), "Wand:W1", "Wand:W2")

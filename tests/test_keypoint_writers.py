@@ -274,11 +274,55 @@ def test_a_track_goes_to_openpose(tmp_path):
         ((3, 17, 2), {"names": "COCO_71"}, "did you mean"),
         ((3, 17, 2), {"names": ["C7"] * 17}, "names of different known joints"),
         ((3, 17, 2), {"scores": np.full((3, 17), np.nan)}, "scores finite"),
+        ((3, 17, 2), {"scores": np.ma.masked_all((3, 17))}, "scores finite"),
+        ((3, 17, 2), {"frames": np.ma.array([0, 1, 2], mask=[0, 1, 0])}, "increasing frame numbers"),
+        ((3, 17, 2), {"fps": [25]}, r"frame rate must be positive, got \[25\]"),
+        ((3, 17, 2), {"image_size": (0, 5)}, r"image_size \(0, 5\): wanted width and height in whole pixels"),
+        ((3, 17, 2), {"image_size": (640.5, 480)}, "width and height in whole pixels"),
+        ((3, 17, 2), {"image_size": (True, 480)}, "width and height in whole pixels"),
+        ((3, 17, 2), {"image_size": "ab"}, "image_size 'ab': wanted width and height in whole pixels"),
+        ((3, 17, 2), {"image_size": 5}, "image_size 5: wanted width and height in whole pixels"),
+        ((3, 17, 2), {"image_size": (1, 2, 3)}, "width and height in whole pixels"),
     ],
 )
 def test_arrays_that_are_no_keypoints_are_refused(points, options, message):
     with pytest.raises(KeypointsError, match=message):
         Keypoints.from_arrays(np.ones(points), **({"names": "COCO_17", "fps": 25} | options))
+
+
+def test_masked_points_are_missing():
+    names = ["left_hip", "right_hip", "left_knee", "right_knee"]
+    values = np.random.default_rng(1).uniform(9, 99, (6, 4, 2))
+    gone = np.zeros(values.shape, bool)
+    gone[2], gone[3, 1, 0] = True, True
+    masked = np.ma.array(np.where(gone, -9999, values), mask=gone)
+    for points in (masked, list(masked), masked.astype(np.float32)):
+        keypoints = Keypoints.from_arrays(points, names=names, fps=25)
+        assert np.isnan(keypoints.points[2]).all() and np.isnan(keypoints.points[3, 1]).all()
+        assert not keypoints.scores[2].any() and np.isfinite(keypoints.points).sum() == 48 - 10
+    other = keypoints.replaced(masked, keypoints.scores)
+    assert np.isnan(other.points[gone]).all() and np.isfinite(other.points[~gone]).all()
+    whole = np.ma.masked_equal(np.array([[[1, 2]], [[-1, -1]]]), -1)
+    assert np.isnan(Keypoints.from_arrays(whole, names=["nose"], fps=25).points[1]).all()
+    with pytest.raises(TypeError, match="wanted real numbers, got complex ones"):
+        Keypoints.from_arrays(values * 1j, names=names, fps=25)
+
+
+def test_sizes_and_numbers_of_numpy_are_whole_numbers(tmp_path):
+    keypoints = Keypoints.from_arrays(
+        np.ones((2, 1, 2)), names=["nose"], fps=np.float32(25), image_size=np.array([640, 480])
+    )
+    assert keypoints.image_size == (640, 480)
+    write_keypoints(tmp_path / "a.csv", keypoints, "csv")
+    read = read_keypoints(tmp_path / "a.csv", person=np.int64(0), image_size=(np.int64(640), 480))
+    assert read.image_size == (640, 480) and type(read.image_size[0]) is int
+
+
+def test_columns_that_are_no_track_are_named():
+    with pytest.raises(
+        KeypointsError, match="not the columns of a track: no frame, time_s, right_shoulder_u"
+    ):
+        keypoints_of_track({})
 
 
 def test_keypoints_from_arrays_are_mended_and_have_no_file_to_be_like(tmp_path):

@@ -52,6 +52,31 @@ def test_bad_options_are_told():
         memo.pointlight(walk(4).positions, [0.0, 1.0, 2.0], ["a"] * 13)
 
 
+def test_masked_points_are_unseen():
+    shown = display(seed=3)
+    masked = np.zeros(shown.positions_px.shape, bool)
+    masked[10:14, 2] = True
+    hidden = np.ma.array(np.where(masked, -9999, shown.positions_px), mask=masked)
+    found = memo.planar(hidden, shown.times_s)
+    wanted = memo.planar(np.where(masked, np.nan, shown.positions_px), shown.times_s)
+    assert found.links() == wanted.links()
+    np.testing.assert_array_equal(found.points.positions, wanted.points.positions)
+    names = [f"p{k}" for k in range(hidden.shape[1])]
+    assert np.isnan(figure.Points(names, shown.times_s, hidden).positions[masked]).all()
+
+
+def test_points_that_do_not_fit_are_refused():
+    for names, times_s, shape in (
+        (["a"], [0.0], (2, 1, 2)),
+        (["a"], [0.0], (1, 2, 2)),
+        ([], [0.0], (1, 1, 4)),
+    ):
+        with pytest.raises(
+            ValueError, match=r"wanted times_s \(T,\) and positions \(T, ., 2 or 3\) of . name"
+        ):
+            figure.Points(names, np.array(times_s), np.zeros(shape))
+
+
 def test_limbs_are_found_again():
     shown = display(azimuth_deg=30, noise_sd_px=1.0)
     found = memo.planar(shown.positions_px, shown.times_s, 1.0)

@@ -22,6 +22,7 @@ from memo.given import nothing_at
 from memo.keypoints import Keypoints, read_keypoints
 from memo.keypoints.recognising import is_no_table
 from memo.keypoints.table import PERSON_COLUMNS
+from memo.missing import real_numbers
 from memo.notebook import Shown
 from memo.pixels import of_video, shrink_of_table
 from memo.table import data_frame, read_number_table
@@ -73,7 +74,7 @@ JOINT_NAMES = frozenset(_SHORT.values())
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Points:
-    """Points over time: `positions` (T, K, 2) pixels or (T, K, 3) metres, NaN for unseen points.
+    """Points over time: `positions` (T, K, 2) pixels or (T, K, 3) metres, NaN or masked for unseen points.
 
     `scales` (T,): scale of each frame, if a person approaches or recedes. `frames` (T,): their numbers in the
     source, if they do not count from 0.
@@ -84,6 +85,16 @@ class Points:
     positions: Array
     scales: Array | None = None
     frames: npt.NDArray[np.int64] | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "positions", real_numbers(self.positions))
+        object.__setattr__(self, "times_s", real_numbers(self.times_s))
+        times, shape, count = self.times_s.shape, self.positions.shape, len(self.names)
+        if len(times) != 1 or shape not in ((*times, count, 2), (*times, count, 3)):
+            raise ValueError(
+                f"wanted times_s (T,) and positions (T, {count}, 2 or 3) of {counted(count, 'name')}, "
+                f"got {times} and {shape}"
+            )
 
     @property
     def numbers(self) -> list[int]:
@@ -215,7 +226,7 @@ def planar(
     progress: Callable[[int, int], object] | None = None,
     **options: Any,
 ) -> PlanarFigure:
-    """Links unnamed tracks (T, K, 2) into limbs that swing in planes.
+    """Links unnamed tracks (T, K, 2), NaN or masked where unseen, into limbs that swing in planes.
 
     `noise_px`: standard deviation of each coordinate. Options: `window_s`, length of the windows; `size_px`
     of the figure, by default that of the points; `carry`: lengths through windows in which the figure is
@@ -226,8 +237,9 @@ def planar(
 
     Defaults: `noise_px` 0.5, `window_s` 1.2, `false_target_rate` 0.01, `max_tilt_deg` 80.
     """
-    tracks = np.ascontiguousarray(tracks, dtype=np.float64)
-    at_s = np.asarray(times_s, dtype=np.float64)
+    tracks, at_s = real_numbers(tracks), real_numbers(times_s)
+    if options.get("scales") is not None:
+        options["scales"] = real_numbers(options["scales"])
     found = _memo.planar(tracks, at_s, noise_px, progress=progress, **options)
     names = options.get("names") or [str(number) for number in range(tracks.shape[1])]
     points = Points(list(names), at_s, tracks)

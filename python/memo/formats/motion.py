@@ -19,6 +19,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from memo.missing import real_numbers
 from memo.wording import counted
 
 __all__ = ["FormatError", "GaitEvent", "Motion", "Up", "from_z_up", "to_z_up"]
@@ -81,9 +82,8 @@ class Motion:
     """(T,) numbers of the frames in the video, from 0, increasing; None if the file has none."""
 
     def __post_init__(self) -> None:
-        times_s = np.asarray(self.times_s, np.float64)
-        points = np.array(self.points, np.float64)
-        angles = {name: np.asarray(values, np.float64) for name, values in self.angles.items()}
+        times_s, points = real_numbers(self.times_s), real_numbers(self.points)
+        angles = {name: real_numbers(values) for name, values in self.angles.items()}
         if times_s.ndim != 1 or points.shape != (len(times_s), len(self.names), 3):
             wanted = f"times (T,) and points (T, {len(self.names)}, 3)"
             raise FormatError(f"wanted {wanted}, got {times_s.shape} and {points.shape}")

@@ -22,7 +22,6 @@ from memo import _memo
 from memo.keypoints.alphapose import image_number, is_by_image, read_by_image
 from memo.keypoints.deeplabcut import known_joints
 from memo.keypoints.found import (
-    MAX_COORDINATE_PX,
     Found,
     Person,
     check_all_placed,
@@ -30,7 +29,7 @@ from memo.keypoints.found import (
     with_points,
 )
 from memo.keypoints.layout import in_layout
-from memo.keypoints.points import Array, Keypoints, KeypointsError, Source, layouts
+from memo.keypoints.points import MAX_COORDINATE_PX, Array, Keypoints, KeypointsError, Source, layouts
 from memo.keypoints.text import check_one_series, content_of, json_text, parsed, short, write_text
 from memo.wording import counted
 

@@ -8,12 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from memo.keypoints.points import Array, Keypoints, KeypointsError, Source, check_finite
+from memo.keypoints.points import (
+    MAX_COORDINATE_PX,
+    Array,
+    Keypoints,
+    KeypointsError,
+    Source,
+    check_finite,
+)
 from memo.keypoints.text import short
 
 __all__ = ["Found", "Person", "check_all_placed", "different", "triples", "with_missing", "with_points"]
-
-MAX_COORDINATE_PX = 1e6
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from numbers import Real
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -17,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from memo import _memo
+from memo.missing import real_numbers
 from memo.table import data_frame
 from memo.wording import counted
 
@@ -29,6 +31,7 @@ __all__ = ["Array", "Keypoints", "KeypointsError", "OptionError", "Someone", "So
 Array = npt.NDArray[np.float64]
 
 MAX_FRAME = 10**9
+MAX_COORDINATE_PX = 1e6
 # A sequence may have gaps, but a video's frame numbers are not mostly gaps.
 _MAX_FRAMES_PER_SEEN = 20
 _MAX_GAP = 1000
@@ -122,17 +125,17 @@ class Keypoints:
         frames: npt.ArrayLike | None = None,
         image_size: tuple[int, int] | None = None,
     ) -> Keypoints:
-        """Keypoints in memory: `points` (T, K, 2) pixels, NaN where missing; `scores` (T, K), else 1.
+        """Keypoints in memory: `points` (T, K, 2) pixels, NaN or masked if missing; `scores` (T, K), else 1.
 
         `names`: the K joints, or the name of a layout such as "COCO_17". `frames` (T,): increasing whole
         numbers, else 0, 1, ...; their gaps become missing points. Either `times_s` (T,), seconds, or `fps`.
         """
         layout, own_names = _named(names)
-        given = np.array(points, np.float64)
+        given = real_numbers(points)
         if given.ndim != 3 or given.shape[1:] != (len(own_names), 2) or not len(given):
             raise KeypointsError(f"wanted points of shape (T, {len(own_names)}, 2), got {given.shape}")
         count = len(given)
-        confidence = np.ones(given.shape[:2]) if scores is None else np.array(scores, np.float64)
+        confidence = np.ones(given.shape[:2]) if scores is None else real_numbers(scores)
         if confidence.shape != given.shape[:2]:
             raise KeypointsError(f"wanted scores of shape {given.shape[:2]}, got {confidence.shape}")
         numbers, times = _timeline(frames, times_s, fps, count)
@@ -153,7 +156,7 @@ class Keypoints:
             times_s=np.interp(every, numbers, times),
             frames=every.astype(np.int64),
             layout=layout,
-            image_size=image_size,
+            image_size=None if image_size is None else checked_size(image_size),
             people=np.isfinite(all_points).any(axis=(1, 2)).astype(np.int64),
             source=Source(Path("arrays"), None),
         )
@@ -192,9 +195,8 @@ class Keypoints:
             )
 
     def replaced(self, points: npt.ArrayLike, scores: npt.ArrayLike) -> Keypoints:
-        """The same keypoints with other points and scores of the same shapes."""
-        new_points = np.array(points, np.float64)
-        new_scores = np.array(scores, np.float64)
+        """The same keypoints with other points and scores of the same shapes; masked points are NaN."""
+        new_points, new_scores = real_numbers(points), real_numbers(scores)
         for name, new, own in (("points", new_points, self.points), ("scores", new_scores, self.scores)):
             if new.shape != own.shape:
                 raise KeypointsError(f"wanted {name} of shape {own.shape}, got {new.shape}")
@@ -225,6 +227,28 @@ def frame_range(where: object, seen: set[int]) -> range:
     return range(first, last + 1)
 
 
+def check_rate(fps: Any) -> None:
+    """Refuses a frame rate that is none; None is no rate."""
+    if fps is not None and not (isinstance(fps, Real) and 0 < float(fps) < math.inf):
+        raise KeypointsError(f"the frame rate must be positive, got {fps}")
+
+
+def checked_size(size: Any) -> tuple[int, int]:
+    """Width and height of a picture in pixels, as given by a user."""
+    if (
+        not isinstance(size, tuple | list | np.ndarray)
+        or len(size) != 2
+        or not all(is_whole(side) and 0 < side <= MAX_COORDINATE_PX for side in size)
+    ):
+        raise KeypointsError(f"image_size {size!r}: wanted width and height in whole pixels")
+    return int(size[0]), int(size[1])
+
+
+def is_whole(value: Any) -> bool:
+    """Whether this is a whole number of Python or NumPy, and not True or False."""
+    return isinstance(value, int | np.integer) and not isinstance(value, bool)
+
+
 def check_finite(keypoints: Keypoints) -> None:
     """Refuses values that no format can store."""
     if np.isinf(keypoints.points).any() or not np.isfinite(keypoints.scores).all():
@@ -250,16 +274,15 @@ def _timeline(
     frames: npt.ArrayLike | None, times_s: npt.ArrayLike | None, fps: float | None, count: int
 ) -> tuple[npt.NDArray[np.int64], Array]:
     """Frame numbers and times, checked."""
-    numbers = np.arange(count) if frames is None else np.asarray(frames)
+    numbers = np.arange(count) if frames is None else np.asarray(np.ma.filled(frames, -1))
     whole = numbers.shape == (count,) and numbers.dtype.kind in "iu"
     if not whole or numbers[0] < 0 or numbers[-1] > MAX_FRAME or (np.diff(numbers) <= 0).any():
         raise KeypointsError(f"wanted {count} increasing frame numbers, whole and not below 0")
     frame_range("arrays", set(numbers.tolist()))
     if (times_s is None) == (fps is None):
         raise KeypointsError("give either times_s or fps")
-    if fps is not None and not 0 < fps < math.inf:
-        raise KeypointsError(f"the frame rate must be positive, got {fps}")
-    times = np.asarray(times_s, np.float64) if fps is None else numbers / fps
+    check_rate(fps)
+    times = real_numbers(times_s) if fps is None else numbers / fps
     if times.shape != (count,) or not np.isfinite(times).all() or (np.diff(times) <= 0).any():
         raise KeypointsError(f"wanted {count} increasing times_s")
     return numbers.astype(np.int64), times

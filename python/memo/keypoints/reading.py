@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from itertools import pairwise
+from numbers import Real
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -15,8 +16,18 @@ import numpy as np
 
 from memo import _memo
 from memo.given import nothing_at
-from memo.keypoints.found import MAX_COORDINATE_PX, Found, Person
-from memo.keypoints.points import Array, Keypoints, KeypointsError, OptionError, Someone, frame_range
+from memo.keypoints.found import Found, Person
+from memo.keypoints.points import (
+    Array,
+    Keypoints,
+    KeypointsError,
+    OptionError,
+    Someone,
+    check_rate,
+    checked_size,
+    frame_range,
+    is_whole,
+)
 from memo.keypoints.recognising import everybody_in
 from memo.pixels import of_video, shrink_of_table
 from memo.wording import counted
@@ -52,11 +63,10 @@ def read_keypoints(
     joints are read.
     """
     path = Path(path)
-    if fps is not None and (isinstance(fps, str) or not 0 < fps < math.inf):
-        raise KeypointsError(f"the frame rate must be positive, got {fps}")
+    check_rate(fps)
     _check_person(person)
-    if image_size is not None and not _is_size(image_size):
-        raise KeypointsError(f"image_size {image_size!r}: wanted width and height in whole pixels")
+    if image_size is not None:
+        image_size = checked_size(image_size)
     try:
         if not path.exists():
             raise KeypointsError(nothing_at(path, "file or folder"))
@@ -74,7 +84,7 @@ def read_keypoints(
 def _own_size(keypoints: Keypoints, image_size: tuple[int, int]) -> tuple[int, int]:
     """The size of the picture, which must be the file's, if the file gives it."""
     width, height = keypoints.image_size or image_size
-    if (width, height) != tuple(image_size):
+    if (width, height) != image_size:
         given = f"{image_size[0]}x{image_size[1]}"
         raise OptionError(
             f"{keypoints.source.path}: is for {width}x{height} pixels, not {given}", "image_size"
@@ -82,23 +92,15 @@ def _own_size(keypoints: Keypoints, image_size: tuple[int, int]) -> tuple[int, i
     return width, height
 
 
-def _is_size(size: Any) -> bool:
-    return (
-        isinstance(size, tuple | list)
-        and len(size) == 2
-        and all(type(side) is int and 0 < side <= MAX_COORDINATE_PX for side in size)
-    )
-
-
 def _check_person(person: Any) -> None:
     if isinstance(person, tuple | list):
         is_place = (
             len(person) == 3
-            and all(isinstance(number, int | float) and math.isfinite(number) for number in person)
+            and all(isinstance(number, Real) and math.isfinite(number) for number in person)
             and person[2] == int(person[2])
         )
     else:
-        is_place = isinstance(person, str) or (type(person) is int and person >= 0)
+        is_place = isinstance(person, str) or (is_whole(person) and person >= 0)
     if person is not None and not is_place:
         raise KeypointsError(
             f"person {person!r} is no number (0, 1, ...), name, or place of a person: (u_px, v_px, frame)"
@@ -245,7 +247,7 @@ def _chosen(
     if person >= count:
         there = f"there {'is' if count == 1 else 'are'} {counted(count, 'person', 'people')}"
         raise KeypointsError(f"{path}: no person {person}: {there}, and the first is 0")
-    return person
+    return int(person)
 
 
 def _at(

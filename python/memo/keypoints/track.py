@@ -9,8 +9,12 @@ import numpy.typing as npt
 
 from memo.files import JOINTS
 from memo.keypoints.points import Keypoints, KeypointsError
+from memo.keypoints.text import short
+from memo.missing import real_numbers
 
 __all__ = ["keypoints_of_track"]
+
+_COLUMNS = ("frame", "time_s", *(f"{joint}_{axis}_px" for joint in JOINTS for axis in "uv"))
 
 
 def keypoints_of_track(columns: Mapping[str, npt.ArrayLike]) -> Keypoints:
@@ -18,14 +22,16 @@ def keypoints_of_track(columns: Mapping[str, npt.ArrayLike]) -> Keypoints:
 
     Frames between walks have none. Two walks in one frame are refused: select the rows of one.
     """
+    absent = [name for name in _COLUMNS if name not in columns]
+    if absent:
+        raise KeypointsError(f"not the columns of a track: no {short(', '.join(absent))}")
     frames = np.asarray(columns["frame"], np.int64)
     if not len(frames):
         raise KeypointsError("a track without rows")
     if len(set(frames.tolist())) < len(frames):
         raise KeypointsError("two walks in one frame: select the rows of one `walk`")
-    points = np.stack(
-        [np.column_stack([columns[f"{joint}_u_px"], columns[f"{joint}_v_px"]]) for joint in JOINTS], axis=1
-    )
+    pixels = [[real_numbers(columns[f"{joint}_{axis}_px"]) for axis in "uv"] for joint in JOINTS]
+    points = np.stack([np.column_stack(both) for both in pixels], axis=1)
     order = np.argsort(frames)
-    times_s = np.asarray(columns["time_s"], np.float64)
+    times_s = real_numbers(columns["time_s"])
     return Keypoints.from_arrays(points[order], names=JOINTS, times_s=times_s[order], frames=frames[order])
