@@ -618,6 +618,17 @@ def test_a_wide_table_is_read_and_written(tmp_path):
     assert read_keypoints(path, fps=100).times_s.tolist() == [0, 0.01, 0.02, 0.03]
 
 
+@pytest.mark.parametrize("options", [{}, {"fps": 5}])
+def test_rows_without_frame_numbers_are_read_in_order_of_time(tmp_path, options):
+    path = tmp_path / "a.csv"
+    path.write_text("time_s,left_knee_x,left_knee_y\n0.4,3,1\n0.0,1,1\n0.2,2,1\n")
+    found = read_keypoints(path, **options)
+    assert found.points[:, 0, 0].tolist() == [1, 2, 3]
+    np.testing.assert_allclose(found.times_s, [0, 0.2, 0.4])
+    found.write(tmp_path / "same.csv")
+    assert (tmp_path / "same.csv").read_text() == path.read_text()
+
+
 def test_a_long_table_is_read_and_written(tmp_path):
     path = tmp_path / "a.csv"
     path.write_text(LONG)

@@ -205,6 +205,7 @@ def test_markers_are_named_by_a_table_and_missing_ones_are_listed(tmp_path, memo
     with open(tmp_path / "out" / "dots.csv", newline="") as file:
         row = next(csv.DictReader(file))
     usual = memo.pointlight(*MOTION).positions_px[0]
+    assert "HEAD_u_px" in row
     assert float(row["RWR_u_px"]) == pytest.approx(usual[2, 0] + 0.01 * 200, abs=1e-3)
     assert float(row["LKN_v_px"]) == pytest.approx(usual[10, 1], abs=1e-3)
     (tmp_path / "map.toml").write_bytes(b"\xef\xbb\xbf" + (tmp_path / "map.toml").read_bytes())
@@ -217,6 +218,7 @@ def test_markers_are_named_by_a_table_and_missing_ones_are_listed(tmp_path, memo
     for text, words in (
         ('tail = "m1"\n', "got tail"),
         ('right_hip = "m1"\nleft_hip = "m2"\nright_hip = "m3"\n', "right_hip has two entries; list the"),
+        ('head = "m1"\nHEAD = "m3"\n', "head has two entries; list the"),
         ('right_hip = "m1"\n  RHP = "m3"\n', "right_hip has two entries; list the"),
         ("", "names no joint; wanted lines such as right_hip ="),
         ("# right_hip\n", "names no joint; wanted lines such as right_hip ="),

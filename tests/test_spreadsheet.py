@@ -23,6 +23,7 @@ from memo.files import (
     read_columns_csv,
     read_events_csv,
     read_text_columns,
+    read_track_csv,
     write_columns_csv,
     write_events_csv,
     write_flips_csv,
@@ -208,3 +209,31 @@ def test_names_are_no_formulas_and_come_back(write, tmp_path):
     path = tmp_path / "table.csv"
     write(path)
     assert formulas_in(path) == []
+
+
+def test_tables_of_what_is_no_table_are_refused_in_one_line(tmp_path):
+    path = tmp_path / "a.csv"
+    refused = [
+        (ValueError, r"column frame: wanted one value per row, got shape \(1, 2\)", {"frame": [[1, 2]]}),
+        (ValueError, "columns of different lengths: {'a': 2, 'b': 1}", {"a": ["x", "y"], "b": ["z"]}),
+        (ValueError, "column speed: numbers need a name with a unit at its end", {"speed": [0.5]}),
+        (TypeError, "wanted columns by their names, got NoneType", None),
+    ]
+    for error, message, columns in refused:
+        with pytest.raises(error, match=message):
+            write_columns_csv(path, columns)
+    with pytest.raises(ValueError, match="event 1 has no time_s, side"):
+        write_events_csv(
+            path,
+            [
+                {"time_s": 0.5, "frame": 1.0, "event": "toe_off", "side": "left"},
+                {"frame": 1.0, "event": "toe_off"},
+            ],
+        )
+    with pytest.raises(ValueError, match="flip 0 has no frame, time_s"):
+        write_flips_csv(path, [{}])
+    assert not path.exists()
+    write_columns_csv(path, {"x_m": np.ma.array([1.0, -9999], mask=[False, True])})
+    np.testing.assert_array_equal(read_columns_csv(path)["x_m"], [1, np.nan])
+    with pytest.raises(TypeError, match="int"):  # not the file with this number
+        read_track_csv(0)

@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from memo.missing import real_numbers
 from memo.pixels import columns_of_video, shrink_of_table
 from memo.spreadsheet import CsvRows, Error, write_rows
 from memo.unfinished import complete_file
@@ -110,17 +111,26 @@ def write_track_csv(path: str | PathLike[str], columns: Mapping[str, npt.ArrayLi
     absent, unknown = set(TRACK_COLUMNS) - set(columns), set(columns) - set(TRACK_COLUMNS)
     if absent or unknown:
         raise ValueError(f"track columns: missing {sorted(absent)}, unknown {sorted(unknown)}")
-    texts = [_texts(name, np.asarray(columns[name])) for name in TRACK_COLUMNS]
-    lengths = {name: len(text) for name, text in zip(TRACK_COLUMNS, texts, strict=True)}
-    if len(set(lengths.values())) > 1:
-        raise ValueError(f"track columns of different lengths: {lengths}")
-    write_table(path, TRACK_COLUMNS, zip(*texts, strict=True))
+    write_columns_csv(path, {name: columns[name] for name in TRACK_COLUMNS})
 
 
 def write_columns_csv(path: str | PathLike[str], columns: Mapping[str, npt.ArrayLike]) -> None:
     """Writes columns of one length in their order; the end of a name determines the number of digits."""
-    texts = [_texts(name, np.asarray(values)) for name, values in columns.items()]
-    write_table(path, columns, zip(*texts, strict=True))
+    if not isinstance(columns, Mapping):
+        raise TypeError(f"wanted columns by their names, got {type(columns).__name__}")
+    texts = {name: _texts(name, _one_column(name, values)) for name, values in columns.items()}
+    lengths = {name: len(text) for name, text in texts.items()}
+    if len(set(lengths.values())) > 1:
+        raise ValueError(f"columns of different lengths: {lengths}")
+    write_table(path, columns, zip(*texts.values(), strict=True))
+
+
+def _one_column(name: str, values: npt.ArrayLike) -> Column:
+    """The values of a column, NaN where they are masked."""
+    column: Column = real_numbers(values) if np.ma.is_masked(values) else np.asarray(values)
+    if column.ndim != 1:
+        raise ValueError(f"column {name}: wanted one value per row, got shape {column.shape}")
+    return column
 
 
 def read_columns_csv(path: str | PathLike[str]) -> dict[str, Column]:
@@ -205,16 +215,21 @@ def read_track(path: str | PathLike[str]) -> dict[str, Column]:
 def write_events_csv(path: str | PathLike[str], events: Iterable[Mapping[str, Any]]) -> None:
     """Writes gait events: dicts with the keys of `EVENT_COLUMNS`; walk and person are 0 if not given."""
     first = {"walk": 0, "person": 0}
-    rows = (
-        [_texts(name, np.asarray([{**first, **event}[name]]))[0] for name in EVENT_COLUMNS]
-        for event in events
-    )
+    rows = [_cells(f"event {place}", {**first, **event}, EVENT_COLUMNS) for place, event in enumerate(events)]
     write_table(path, EVENT_COLUMNS, rows)
+
+
+def _cells(what: str, values: Mapping[str, Any], names: Sequence[str]) -> list[str]:
+    """The texts of a row of a table."""
+    absent = [name for name in names if name not in values]
+    if absent:
+        raise ValueError(f"{what} has no {', '.join(absent)}")
+    return [_texts(name, np.asarray([values[name]]))[0] for name in names]
 
 
 def write_flips_csv(path: str | PathLike[str], flips: Iterable[Mapping[str, Any]]) -> None:
     """Writes the changes of right and left: dicts with the keys of `FLIP_COLUMNS`."""
-    rows = ([_texts(name, np.asarray([flip[name]]))[0] for name in FLIP_COLUMNS] for flip in flips)
+    rows = [_cells(f"flip {place}", flip, FLIP_COLUMNS) for place, flip in enumerate(flips)]
     write_table(path, FLIP_COLUMNS, rows)
 
 
@@ -265,7 +280,7 @@ def read_text_columns(
     It reads every table of memo; ValueError names the file and the row.
     """
     try:
-        with open(path, newline="", encoding="utf-8-sig") as file:
+        with open(Path(path), newline="", encoding="utf-8-sig") as file:
             header, *rows = list(CsvRows(file)) or [[]]
     except (Error, UnicodeDecodeError) as error:
         raise ValueError(f"{path}: not a table: {error}") from None
@@ -299,7 +314,9 @@ def read_text(
 def _texts(name: str, values: Column) -> list[str]:
     if values.dtype.kind in "iuUO":
         return [str(value) for value in values]
-    digits = next(digits for suffix, digits in _DIGITS.items() if name.endswith(suffix))
+    digits = next((digits for suffix, digits in _DIGITS.items() if name.endswith(suffix)), None)
+    if digits is None:
+        raise ValueError(f"column {name}: numbers need a name with a unit at its end, such as {name}_m")
     return [f"{value:.{digits}f}" if np.isfinite(value) else "" for value in values]
 
 

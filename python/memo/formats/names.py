@@ -251,9 +251,10 @@ def read_marker_map(path: Path) -> dict[str, tuple[str, ...]]:
 def _joints_of(markers: Mapping[str, tuple[str, ...]], path: Path) -> dict[str, tuple[str, ...]]:
     """The same with memo's names of the joints."""
     try:
-        spelt = {joint: _memo.joint_name(joint) for joint in markers}
+        names = {joint: _memo.joint_name(joint) for joint in markers}
     except ValueError as error:
         raise FormatError(f"{path}: {error}") from None
+    spelt = {joint: "head" if name == "head_top" else name for joint, name in names.items()}
     known = ", ".join([*JOINTS, "head"])
     if not markers:
         raise FormatError(

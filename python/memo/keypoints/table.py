@@ -181,28 +181,41 @@ def joint_of(path: Path, text: str) -> str | None:
 def row_frames(
     path: Path, rows: list[list[str]], columns: Columns
 ) -> tuple[dict[int, int], dict[int, float] | None]:
-    """The frame of each row that is not blank, and the time of each frame."""
+    """The frame of each row that is not blank, and the time of each frame.
+
+    Without a column `frame`, frames are numbered in order of time.
+    """
+    lines = [line for line, row in enumerate(rows[1:], start=1) if any(row)]
+    at_s = (
+        {} if columns.time_s is None else {line: _time_s(path, rows, columns.time_s, line) for line in lines}
+    )
+    rank = {time_s: frame for frame, time_s in enumerate(sorted(set(at_s.values())))}
     frames: dict[int, int] = {}
     times_s: dict[int, float] = {}
-    frame_at: dict[float, int] = {}
-    for line, row in enumerate(rows[1:], start=1):
-        if not any(row):
-            continue
+    for line in lines:
         where = f"{path}: row {line + 1}"
-        time_s = math.nan if columns.time_s is None else number_of(row[columns.time_s], f"{where}, time_s")
-        if columns.time_s is not None and math.isnan(time_s):
-            raise KeypointsError(f"{where}: no time_s")
-        if columns.frame is None:
-            frame = frame_at.setdefault(time_s, len(frame_at))
-        else:
-            number = number_of(row[columns.frame], f"{where}, frame")
-            if not (0 <= number <= MAX_FRAME and number == int(number)):
-                raise KeypointsError(f"{where}: frame {short(row[columns.frame])} is not a frame number")
-            frame = int(number)
+        frame = rank[at_s[line]] if columns.frame is None else _frame(where, rows[line][columns.frame])
         frames[line] = frame
-        if times_s.setdefault(frame, time_s) != time_s and columns.time_s is not None:
-            raise KeypointsError(f"{where}: frame {frame} at two times, {times_s[frame]:g} and {time_s:g}")
+        if line in at_s and times_s.setdefault(frame, at_s[line]) != at_s[line]:
+            raise KeypointsError(
+                f"{where}: frame {frame} at two times, {times_s[frame]:g} and {at_s[line]:g}"
+            )
     return frames, times_s if columns.time_s is not None else None
+
+
+def _time_s(path: Path, rows: list[list[str]], column: int, line: int) -> float:
+    where = f"{path}: row {line + 1}"
+    time_s = number_of(rows[line][column], f"{where}, time_s")
+    if math.isnan(time_s):
+        raise KeypointsError(f"{where}: no time_s")
+    return time_s
+
+
+def _frame(where: str, cell: str) -> int:
+    number = number_of(cell, f"{where}, frame")
+    if not (0 <= number <= MAX_FRAME and number == int(number)):
+        raise KeypointsError(f"{where}: frame {short(cell)} is not a frame number")
+    return int(number)
 
 
 def wide_people(path: Path, rows: list[list[str]], columns: Columns, frames: dict[int, int]) -> list[Person]:
