@@ -151,6 +151,34 @@ def test_small_frames_are_enlarged_about_pixel_centres(core):
     assert yellow.mean() == 301  # the middle of the nine pixels that pixel 100 became
 
 
+def test_frames_of_another_size_and_impossible_inks_are_refused(core):
+    track = core.Track([0.0], core.Camera((180, 144)), "tracked")
+    for frame, words in (
+        (np.zeros((10, 180), np.uint8), "the track is of frames of 180x144 pixels, got a frame of 180x10"),
+        (np.zeros((180, 144), np.uint8), "got a frame of 144x180"),
+        (np.zeros((144, 180, 3), np.uint8), r"grey values of shape \(height, width\), got shape"),
+    ):
+        with pytest.raises(ValueError, match=words):
+            draw_row(frame, track, 0)
+    with pytest.raises(ValueError, match="180x144 pixels averaged 2 by 2, got a frame of 180x144"):
+        draw_row(np.zeros((144, 180), np.uint8), track, 0, shrink=2)
+    assert draw_row(np.zeros((72, 90), np.uint8), track, 0, shrink=2).shape[2] == 3
+    segment = np.array([[[5.0, 5.0], [50.0, 30.0]]])
+    for colour in ((256, 0, 0), (-1, 0, 0), (0.5, 0, 0), (1, 2), None, "red"):
+        for draw in (
+            lambda ink: draw_segments(canvas(), segment, ink, 2.0),
+            lambda ink: draw_text(canvas(), "a", ink),
+        ):
+            with pytest.raises(ValueError, match="a colour must be three whole numbers from 0 to 255, got"):
+                draw(colour)
+    for opacity in (-1, 2, float("nan")):
+        with pytest.raises(ValueError, match="opacity must be from 0 to 1, got"):
+            draw_segments(canvas(), segment, WHITE, 2.0, opacity=opacity)
+    for width in (0, -1, float("nan"), float("inf")):
+        with pytest.raises(ValueError, match="width_px must be positive and finite"):
+            draw_segments(canvas(), segment, WHITE, width)
+
+
 def test_overlay_of_nothing_leaves_no_file(tmp_path, track):
     with pytest.raises(ValueError, match="no frames"):
         write_overlay(tmp_path / "overlay.mp4", [], track)

@@ -11,6 +11,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from fractions import Fraction
 from functools import lru_cache
+from numbers import Integral
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -83,7 +84,7 @@ def draw_row(luma: Luma, track: Any, row: int, *, shrink: int = 1) -> Rgb:
     """The frame of one row of the track with model contours, limbs, ankle trails and legend on it.
 
     A small frame is enlarged by a whole number, so that lines and letters stay thin. `shrink`: pixels of the
-    track per pixel of `luma`, along each axis.
+    track per pixel of `luma`, along each axis. A frame of another size than the track's is refused.
     """
     return draw_rows(luma, track, [row], shrink=shrink)
 
@@ -91,6 +92,7 @@ def draw_row(luma: Luma, track: Any, row: int, *, shrink: int = 1) -> Rgb:
 def draw_rows(luma: Luma, track: Any, rows: Sequence[int], *, shrink: int = 1) -> Rgb:
     """A frame with everybody in it: its rows of the track, each as `draw_row` draws one. Of several people,
     each has a colour and a number."""
+    _check_frame(luma, track, shrink)
     scale = _scale(luma)
     rgb = _enlarged(luma, scale)
     width_px = max(1.0, rgb.shape[0] / 360)
@@ -116,6 +118,33 @@ def draw_rows(luma: Luma, track: Any, rows: Sequence[int], *, shrink: int = 1) -
         _number(rgb, int(columns["person"][row]), placed(drawn).reshape(-1, 2))
     _legend(rgb, columns, rows, several)
     return rgb
+
+
+def _check_frame(luma: Luma, track: Any, shrink: int) -> None:
+    """Refuses a frame that is not one of the track's by its size."""
+    if luma.ndim != 2:
+        raise ValueError(f"a frame must be grey values of shape (height, width), got shape {luma.shape}")
+    if track.camera is None:
+        return
+    size, of_track = luma.shape[1::-1], tuple(track.camera.size)
+    # Averaging leaves out columns and rows at the border; the camera may not have those.
+    could_be = [
+        whole - shrink < shrink * side < whole + track.shrink
+        for side, whole in zip(size, of_track, strict=True)
+    ]
+    if not all(could_be):
+        got, wanted = ("x".join(map(str, sides)) for sides in (size, of_track))
+        averaged = f" averaged {shrink} by {shrink}" if shrink > 1 else ""
+        raise ValueError(f"the track is of frames of {wanted} pixels{averaged}, got a frame of {got}")
+
+
+def _checked_colour(colour: Sequence[int]) -> npt.NDArray[np.float32]:
+    channels = np.asarray(colour, dtype=object)
+    if channels.shape != (3,) or not all(
+        isinstance(channel, Integral) and 0 <= int(channel) <= 255 for channel in channels
+    ):
+        raise ValueError(f"a colour must be three whole numbers from 0 to 255, got {colour!r}")
+    return channels.astype(np.float32)
 
 
 def _number(rgb: Rgb, person: int, points_px: Segments) -> None:
@@ -151,7 +180,15 @@ def _legend(rgb: Rgb, columns: Mapping[str, Any], rows: Sequence[int], several: 
 def draw_segments(
     rgb: Rgb, segments: Segments, colour: Colour, width_px: float, *, opacity: float = 1.0
 ) -> None:
-    """Draws (N, 2, 2) segments in pixels; those with a NaN and parts outside the image are left out."""
+    """Draws (N, 2, 2) segments in pixels; those with a NaN and parts outside the image are left out.
+
+    `colour`: red, green and blue, 0 to 255; `opacity`: 0 to 1.
+    """
+    ink = _checked_colour(colour)
+    if not 0 <= opacity <= 1:
+        raise ValueError(f"opacity must be from 0 to 1, got {opacity}")
+    if not (width_px > 0 and np.isfinite(width_px)):
+        raise ValueError(f"width_px must be positive and finite, got {width_px}")
     reach_px = width_px / 2 + 0.5
     size = np.array(rgb.shape[1::-1])
     pieces = _pieces(_clipped(segments[np.isfinite(segments).all(axis=(1, 2))], size, reach_px + 1))
@@ -165,7 +202,7 @@ def draw_segments(
     coverage = np.zeros(len(at))
     np.maximum.at(coverage, place, covered[seen])
     rows, columns = np.divmod(at, size[0])
-    rgb[rows, columns] = _blended(rgb[rows, columns], coverage, colour)
+    rgb[rows, columns] = _blended(rgb[rows, columns], coverage, ink)
 
 
 def draw_text(
@@ -173,12 +210,13 @@ def draw_text(
 ) -> None:
     """Writes text on a dark background, clipped at the image's edge: a line of those in the upper left
     corner, or with its upper left corner `at` a pixel."""
+    shade = _checked_colour(colour)
     ink = np.concatenate([_ink(character, _text_height_px(rgb)) for character in text], axis=1)
     left, top = (4, 4 + line * ink.shape[0]) if at is None else at
     ink = ink[max(-top, 0) :, max(-left, 0) :]
     left, top = max(left, 0), max(top, 0)
     ground = rgb[top : top + ink.shape[0], left : left + ink.shape[1]]
-    ground[:] = _blended(ground // 3, ink[: ground.shape[0], : ground.shape[1]], colour)
+    ground[:] = _blended(ground // 3, ink[: ground.shape[0], : ground.shape[1]], shade)
 
 
 def _text_height_px(rgb: Rgb) -> int:
@@ -231,8 +269,8 @@ def _distances(
     return distances
 
 
-def _blended(rgb: Rgb, coverage: npt.NDArray[np.floating], colour: Colour) -> Rgb:
-    mixed = rgb + coverage[..., None] * (np.array(colour, np.float32) - rgb) + 0.5
+def _blended(rgb: Rgb, coverage: npt.NDArray[np.floating], ink: npt.NDArray[np.float32]) -> Rgb:
+    mixed = rgb + coverage[..., None] * (ink - rgb) + 0.5
     return mixed.astype(np.uint8)
 
 
