@@ -174,6 +174,36 @@ def test_clinical_hips_are_against_the_pelvis(tmp_path, memo_command):
     assert code == 1 and "need a folder of `memo track`" in err
 
 
+@pytest.mark.parametrize("ending", ["csv", "parquet"])
+def test_tables_name_the_reference_of_clinical_hips(tmp_path, memo_command, ending):
+    if ending == "parquet":
+        pytest.importorskip("pyarrow")
+    write_track(tmp_path / "run")
+    tables = {}
+    for option in ("", "--clinical"):
+        target = tmp_path / f"walk{option}.{ending}"
+        code, _, err = memo_command(
+            "convert", tmp_path / "run", target, "--walk", 0, *[option] * bool(option)
+        )
+        assert code == 0, err
+        tables[option] = read_motion(target)
+    plain, raised = tables[""], tables["--clinical"]
+    for name in ("right_hip", "left_hip"):
+        np.testing.assert_allclose(raised.angles[name], plain.angles[name] + 11.4, atol=2e-6)
+    if ending == "csv":
+        header = (tmp_path / "walk--clinical.csv").read_text().splitlines()[0].split(",")
+        assert "right_hip_clinical_deg" in header and "right_hip_deg" not in header
+        assert "right_knee_deg" in header and "right_knee_clinical_deg" not in header
+        assert "right_hip_deg" in (tmp_path / "walk.csv").read_text().splitlines()[0].split(",")
+    # The reference is known again when the table is read.
+    code, _, err = memo_command("convert", tmp_path / f"walk--clinical.{ending}", tmp_path / "again.mot")
+    assert code == 0, err
+    head = (tmp_path / "again.mot").read_text().partition("endheader")[0].splitlines()
+    assert any(line.startswith("hip_flexion_r: thigh against a pelvis tilted forwards") for line in head)
+    code, _, err = memo_command("convert", tmp_path / f"walk--clinical.{ending}", tmp_path / "again.csv")
+    assert code == 0 and "right_hip_clinical_deg" in (tmp_path / "again.csv").read_text().splitlines()[0], err
+
+
 def test_files_with_angles_state_their_references(tmp_path, memo_command):
     write_track(tmp_path / "run")
     against = {

@@ -16,10 +16,18 @@ from dataclasses import replace
 
 from memo.formats.motion import FormatError, Motion
 
-__all__ = ["PELVIC_TILT_DEG", "clinical"]
+__all__ = ["CLINICAL", "CLINICAL_HIP", "PELVIC_TILT_DEG", "clinical"]
 
 PELVIC_TILT_DEG = (11.4, 4.8)
 """Anterior tilt of the pelvis of healthy adults who walk: average and standard deviation over people."""
+
+CLINICAL_HIP = (
+    f"thigh against a pelvis tilted forwards by {PELVIC_TILT_DEG[0]} degrees, the average of adults"
+)
+"""The reference of clinical hip angles."""
+
+CLINICAL = "_clinical"
+"""Behind the name of such an angle in the columns of tables, which cannot state a reference."""
 
 
 def clinical(motion: Motion) -> Motion:
@@ -37,7 +45,6 @@ def clinical(motion: Motion) -> Motion:
         f"Hip angles are relative to a pelvis with the average tilt of {average} degrees (people differ by"
         f" {sd}): the level of the hip curves is not measured."
     )
-    reference = f"thigh against a pelvis tilted forwards by {average} degrees, the average of adults"
-    hips = {name: reference for name in ("right_hip", "left_hip") if name in angles}
+    hips = {name: CLINICAL_HIP for name in ("right_hip", "left_hip") if name in angles}
     metadata = {**motion.metadata, "references": {**motion.metadata.get("references", {}), **hips}}
     return replace(motion, angles=angles, metadata=metadata, notes=(*motion.notes, note))

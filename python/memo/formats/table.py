@@ -1,5 +1,8 @@
 """Tables of joints: CSV with one header row, `<joint>_x_m`, `<joint>_y_m`, `<joint>_z_m` and `<angle>_deg`.
 
+Clinical hip angles (`memo convert --clinical`) are `right_hip_clinical_deg`, so that nobody takes them for
+those against the vertical.
+
 Times are in the column `time_s`, or follow from a rate in a comment ("# metres, Z up, 100 Hz") or from
 the caller. Z is up, as in all tables of memo, unless a comment before the header says `Y up`. This comment
 is written only with Y up, so that any program can read files with Z up. Empty cells are missing.
@@ -19,6 +22,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from memo.formats.clinical import CLINICAL, CLINICAL_HIP
 from memo.formats.motion import FormatError, Motion, Up, from_z_up, to_z_up
 from memo.formats.names import joint_places, standing_up
 from memo.formats.reading import METRIC_M, Given, chosen_up, unit_of_legs
@@ -47,6 +51,10 @@ def motion_of_table(table: NumberTable, given: Given) -> Motion:
         for name, index in table.column.items()
         if name.endswith("_deg") and name != "_deg"
     }
+    hips = {f"{side}_hip{CLINICAL}": f"{side}_hip" for side in ("right", "left")}
+    hips = {column: hip for column, hip in hips.items() if column in angles and hip not in angles}
+    angles = {hips.get(name, name): values for name, values in angles.items()}
+    references = {"references": dict.fromkeys(hips.values(), CLINICAL_HIP)} if hips else {}
     names, points = table.points(3)
     comments = "\n".join(table.comments)
     said = re.search(r"\b([yz])[ -]up\b", comments, re.IGNORECASE)
@@ -68,7 +76,7 @@ def motion_of_table(table: NumberTable, given: Given) -> Motion:
         table.times_s(given.rate_hz),
         to_z_up(points * unit_m, up),
         angles=angles,
-        metadata={"format": "csv", "up": up, "unit": "m"},
+        metadata={"format": "csv", "up": up, "unit": "m", **references},
         notes=notes,
         frames=_frames(table),
     )
@@ -124,7 +132,10 @@ def write_table(path: Path, motion: Motion, up: Up) -> list[str]:
 
 def motion_columns(motion: Motion, up: Up) -> dict[str, npt.NDArray[np.float64]]:
     """The columns of a table of the motion, (T,) each, `time_s` first, for all tabular formats."""
-    columns = {"time_s": motion.times_s} | {f"{name}_deg": values for name, values in motion.angles.items()}
+    references = motion.metadata.get("references", {})
+    columns = {"time_s": motion.times_s}
+    for name, values in motion.angles.items():
+        columns[f"{name}{CLINICAL if references.get(name) == CLINICAL_HIP else ''}_deg"] = values
     turned = from_z_up(motion.points, up)
     for k, name in enumerate(motion.names):
         columns |= {f"{name}_{axis}_m": turned[:, k, i] for i, axis in enumerate("xyz")}
