@@ -10,6 +10,7 @@ import os
 import re
 import shutil
 import time
+from pathlib import Path
 
 import fake_core
 import fake_explain
@@ -349,8 +350,49 @@ def test_a_walk_that_the_model_does_not_fit_is_named(two_folders):
     run["walks"] = [{"fit": {"measured": True, "fits": "poorly"}}]
     (second / "run.json").write_text(json.dumps(run))
     report = write_comparison(*two_folders)
-    said = "after: the model fits the person poorly; check its overlay before use."
+    said = "after: the model fits the person poorly; do not use its angles."
     assert said in report.contents["notes"] and said in report.path.read_text(encoding="utf-8")
+    run["walks"] = [{"fit": {"measured": True, "fits": "in part"}}]
+    (second / "run.json").write_text(json.dumps(run))
+    said = "after: the model fits the person in part; check its overlay before use."
+    assert said in write_comparison(*two_folders).contents["notes"]
+
+
+def test_no_difference_is_stated_of_a_walk_that_the_model_fits_poorly(two_folders, memo_command):
+    first, second = two_folders
+    for folder, speed in zip(two_folders, ("1.2,m/s,1.15,1.25", "0.6,m/s,0.55,0.65"), strict=True):
+        table = folder / "gait_parameters.csv"
+        table.write_text(table.read_text() + f"0,speed,,{speed},4\n")
+        columns = read_track_csv(folder / "track.csv")
+        write_track_csv(folder / "track.csv", columns | {"p_swapped": np.full(20, 0.01)})
+    said = write_comparison(first, second).contents["sentences"]
+    assert any(sentence.startswith("Speed: 0.600 m/s") for sentence in said) and len(said) > 1
+    run = json.loads((second / "run.json").read_text())
+    run["walks"] = [{"fit": {"measured": True, "fits": "poorly"}}]
+    (second / "run.json").write_text(json.dumps(run))
+    report = write_comparison(first, second)
+    assert report.contents["sentences"] == [
+        "after: the model fits the person poorly, so no difference between the walks is stated: it may be an "
+        "error of the fit."
+    ]
+    page = report.path.read_text(encoding="utf-8")
+    assert "not judged: the model fits a walk poorly" in page and "-0.600" not in page
+    code, out, _ = memo_command("report", first, second)
+    assert code == 0 and out.splitlines()[1].startswith("after: the model fits the person poorly")
+
+
+def test_the_page_of_a_comparison_has_the_documented_repeatability():
+    root = Path(__file__).resolve().parents[1]
+    table = (root / "docs/reference/accuracy.md").read_text(encoding="utf-8")
+    row = re.search(r"two clips of the same walk \((\d+) pairs\)[^|]*\|([^|]*)\|([^|]*)\|", table)
+    pairs, hip, knee = row[1], *(cell.split(",")[0].strip() for cell in row.groups()[1:])
+    page = (root / "python/memo/report/assets/comparison.html").read_text(encoding="utf-8")
+    wanted = f"had an RMS difference of {hip} at the hip and {knee} at the knee (medians of {pairs} pairs"
+    assert wanted in page
+    text = " ".join(table.split())
+    ranges = re.search(r"clothes that hardly differ from the background they are ([^ ]+) and ([^ ]+)\.", text)
+    for degrees in ranges.groups():
+        assert degrees.replace("-", " to ") in page
 
 
 def test_walks_that_cannot_be_compared(two_folders, memo_command, posture_folder):

@@ -28,6 +28,7 @@ __all__ = ["comparison_page"]
 
 _NO_DIFFERENCE = "no difference can be told"
 _UNSURE_SIDES = "not judged: left and right, or the heading, may be wrong"
+_FITS_POORLY = "not judged: the model fits a walk poorly"
 
 
 def comparison_page(
@@ -48,9 +49,18 @@ def comparison_page(
         max(_p_swapped(run, walk), run.p_other_heading(walk)) <= LIKELY_MISTAKEN
         for run, walk in zip(runs, chosen, strict=True)
     )
-    told = [one for one in parameters if are_sides_sure or not one.is_of_a_side]
-    sentences = difference_sentences(("A", "B"), told, curves if are_sides_sure else [])
     names = _names(runs, chosen)
+    verdicts = [run.verdict(walk) for run, walk in zip(runs, chosen, strict=True)]
+    poor = [name for name, verdict in zip(names, verdicts, strict=True) if verdict == "poorly"]
+    sentences = [
+        f"{name}: the model fits the person poorly, so no difference between the walks is stated: it may be "
+        "an error of the fit."
+        for name in poor
+    ]
+    if not poor:
+        told = [one for one in parameters if are_sides_sure or not one.is_of_a_side]
+        sentences = difference_sentences(("A", "B"), told, curves if are_sides_sure else [])
+    unjudged = _FITS_POORLY if poor else None if are_sides_sure else _UNSURE_SIDES
     each = zip(names, runs, chosen, strict=True)
     notes = [note for name, run, walk in each for note in _doubts(name, run, walk)]
     page = Page(
@@ -63,8 +73,8 @@ def comparison_page(
             "second": text(names[1]),
             "sentences": "".join(f"<p>{text(said)}</p>" for said in sentences),
             "warnings": "".join(f"<li>{text(note)}</li>" for note in notes),
-            "parameters": _parameter_table(parameters, are_sides_sure),
-            "curves": _curve_table(curves, are_sides_sure),
+            "parameters": _parameter_table(parameters, unjudged),
+            "curves": _curve_table(curves, unjudged),
             "band_source": text(normative.SOURCE),
         },
         data={"cycles": _cycles(runs, chosen)},
@@ -112,7 +122,8 @@ def _doubts(name: str, run: RunFolder, walk: int) -> list[str]:
         told.append(f"{name}: the person walks backwards.")
     verdict = run.verdict(walk)
     if verdict not in (None, "well", "not measured"):
-        told.append(f"{name}: the model fits the person {verdict}; check its overlay before use.")
+        advice = "do not use its angles" if verdict == "poorly" else "check its overlay before use"
+        told.append(f"{name}: the model fits the person {verdict}; {advice}.")
     if p_swapped > LIKELY_MISTAKEN:
         told.append(f"{name}: left and right may be swapped (probability {p_swapped:.0%}).")
     if run.p_other_heading(walk) > LIKELY_MISTAKEN:
@@ -135,9 +146,9 @@ def _cycles(runs: tuple[RunFolder, RunFolder], walks: tuple[int, int]) -> dict[s
     return {"curves": curves, "band": normative.band()}
 
 
-def _parameter_table(parameters: list[ParameterDifference], are_sides_sure: bool) -> str:
+def _parameter_table(parameters: list[ParameterDifference], unjudged: str | None) -> str:
     rows = [
-        (_parameter(one.first), measured(one.first), measured(one.second), _difference(one, are_sides_sure))
+        (_parameter(one.first), measured(one.first), measured(one.second), _difference(one, unjudged))
         for one in parameters
         if np.isfinite(one.first["value"]) or np.isfinite(one.second["value"])
     ]
@@ -151,30 +162,30 @@ def _parameter(row: Any) -> str:
     return text(str(row["parameter"]).replace("_", " ") + side + unit)
 
 
-def _difference(one: ParameterDifference, are_sides_sure: bool) -> str:
-    """The difference with its interval, and whether it can be told, as HTML."""
+def _difference(one: ParameterDifference, unjudged: str | None) -> str:
+    """The difference with its interval, and whether it can be told, as HTML; else why it is not judged."""
     if not np.isfinite(one.value):
         return number(one.value)
-    if one.is_of_a_side and not are_sides_sure:
-        return _UNSURE_SIDES
+    if unjudged is not None and (one.is_of_a_side or unjudged != _UNSURE_SIDES):
+        return unjudged
     digits = one.digits
     interval = f"{number(one.value - one.half, digits)} to {number(one.value + one.half, digits)}"
     told = "" if one.is_sure else f"; {_NO_DIFFERENCE}"
     return f'{number(one.value, digits)} <small class="interval">{interval}{told}</small>'
 
 
-def _curve_table(curves: list[CurveDifference], are_sides_sure: bool) -> str:
+def _curve_table(curves: list[CurveDifference], unjudged: str | None) -> str:
     rows = [
-        (text(f"{curve.side} {curve.joint}"), number(curve.rms_deg, 1), _largest(curve, are_sides_sure))
+        (text(f"{curve.side} {curve.joint}"), number(curve.rms_deg, 1), _largest(curve, unjudged))
         for curve in curves
     ]
     header = ("joint", "RMS difference, °", "largest sure difference B less A, °")
     return rows_table("Mean gait cycles", header, rows)
 
 
-def _largest(curve: CurveDifference, are_sides_sure: bool) -> str:
-    if not are_sides_sure:
-        return _UNSURE_SIDES
+def _largest(curve: CurveDifference, unjudged: str | None) -> str:
+    if unjudged is not None:
+        return unjudged
     if curve.joint not in JUDGED:
         return "not judged: its errors are larger than stated"
     if not curve.is_sure:
