@@ -154,13 +154,13 @@ def test_small_frames_are_enlarged_about_pixel_centres(core):
 def test_frames_of_another_size_and_impossible_inks_are_refused(core):
     track = core.Track([0.0], core.Camera((180, 144)), "tracked")
     for frame, words in (
-        (np.zeros((10, 180), np.uint8), "the track is of frames of 180x144 pixels, got a frame of 180x10"),
+        (np.zeros((10, 180), np.uint8), "the track is of frames of size 180x144, got a frame of 180x10"),
         (np.zeros((180, 144), np.uint8), "got a frame of 144x180"),
         (np.zeros((144, 180, 3), np.uint8), r"grey values of shape \(height, width\), got shape"),
     ):
         with pytest.raises(ValueError, match=words):
             draw_row(frame, track, 0)
-    with pytest.raises(ValueError, match="180x144 pixels averaged 2 by 2, got a frame of 180x144"):
+    with pytest.raises(ValueError, match="180x144 averaged 2 by 2, got a frame of 180x144"):
         draw_row(np.zeros((144, 180), np.uint8), track, 0, shrink=2)
     assert draw_row(np.zeros((72, 90), np.uint8), track, 0, shrink=2).shape[2] == 3
     segment = np.array([[[5.0, 5.0], [50.0, 30.0]]])

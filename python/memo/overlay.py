@@ -135,7 +135,7 @@ def _check_frame(luma: Luma, track: Any, shrink: int) -> None:
     if not all(could_be):
         got, wanted = ("x".join(map(str, sides)) for sides in (size, of_track))
         averaged = f" averaged {shrink} by {shrink}" if shrink > 1 else ""
-        raise ValueError(f"the track is of frames of {wanted} pixels{averaged}, got a frame of {got}")
+        raise ValueError(f"the track is of frames of size {wanted}{averaged}, got a frame of {got}")
 
 
 def _checked_colour(colour: Sequence[int]) -> npt.NDArray[np.float32]:
