@@ -40,7 +40,7 @@ def walk(**values):
         "measured_height": _memo.BodyHeight(1.71, 0.04, "measured"),
         "height_is_contradicted": False,
         "walk_ratio": _memo.WalkRatio(0.006, 0.004, 0.011),
-        "fit": types.SimpleNamespace(sole_m=0.002, is_off_ground=False),
+        "fit": types.SimpleNamespace(sole_m=0.002, is_off_ground=False, verdict="well"),
         "unexplained": 0.003,
         "is_beside_somebody": False,
     }
@@ -169,8 +169,10 @@ def test_the_verdict_gives_its_reason():
     assert said() == f"The model fits the person well: {on_average}, and 1% of it has no edge."
     assert said(verdict="poorly", is_far=True) == (
         f"The model fits the person poorly: {on_average}, 1.0% of the person's height, which is too far; "
-        "1% of it has no edge. Check the overlay before use."
+        "1% of it has no edge. The model may be in a wrong place: check the overlay, and do not use the "
+        "angles."
     )
+    assert said(verdict="in part").endswith("Check the overlay before use.")
     assert "too far" not in said(verdict="poorly", missed=0.2)
     off = {"off_parts": ["left shank", "left foot"], "part_missed": {"left shank": 0.34, "left foot": 0.4}}
     off |= {"verdict": "in part", "part_residual_px": {"left shank": 1.2}}
@@ -262,6 +264,19 @@ def test_without_a_camera_a_height_is_measured_against_the_first_persons():
     )
     assert "if the height of the other person" in without and "standard deviation" not in without
     assert "measured in the picture" in calibrated
+
+
+def test_a_height_that_the_fit_did_not_measure_is_not_called_measured():
+    measured = _memo.BodyHeight(1.82, 0.05, "measured")
+    (said,) = measured_height_sentences(walk(height=measured, measured_height=None, fit=None))
+    assert said.startswith("The person is taken to be 1.82 m tall, as the moving region at the start")
+    assert said.endswith("so the height was not measured.") and "measured in the picture" not in said
+    for verdict, is_doubtful in (("well", False), ("in part", False), ("poorly", True)):
+        fit = types.SimpleNamespace(verdict=verdict)
+        (said,) = measured_height_sentences(walk(height=measured, measured_height=measured, fit=fit))
+        assert ("measured in the picture (standard deviation 0.05 m)" in said) and (
+            ("by a model that fits poorly: the error may be much larger." in said) is is_doubtful
+        )
 
 
 def test_who_has_no_height_of_their_own_is_told_apart_from_nobody_having_one():

@@ -116,11 +116,17 @@ def measured_height_sentences(walk: Walk, *, camera_given: bool = True) -> list[
             "at that time, is right: without a calibrated camera, it is measured against that height and as "
             "wrong as that one."
         ]
-    if height.source == "measured":
+    if height.source == "measured" and walk.measured_height is None:
         return [
-            f"The person is {height.height_m:.2f} m tall, measured in the picture "
-            f"(standard deviation {height.sd_m:.2f} m)."
+            f"The person is taken to be {height.height_m:.2f} m tall, as the moving region at the start of "
+            "the walk suggests: the outline was not fitted, so the height was not measured."
         ]
+    if height.source == "measured":
+        sd = f"(standard deviation {height.sd_m:.2f} m)"
+        doubt = ""
+        if walk.fit is not None and walk.fit.verdict == "poorly":
+            doubt = ", but by a model that fits poorly: the error may be much larger"
+        return [f"The person is {height.height_m:.2f} m tall, measured in the picture {sd}{doubt}."]
     return contradiction_sentences(walk)
 
 

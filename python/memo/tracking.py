@@ -761,3 +761,5 @@ def fit_sentence(walk: _memo.Walk) -> str | None:
     if all(np.isnan(walk.columns[name]).all() for name in _ANGLE_COLUMNS):
         unsure = "No joint angle is known well enough to be stated. " + unsure
     return f"The model fits the person {fit.verdict}: {seen}. {unsure}"
+    if fit.verdict == "poorly":
+        unsure = "The model may be in a wrong place: check the overlay, and do not use the angles."
