@@ -18,6 +18,7 @@ import pytest
 from matplotlib import pyplot
 from matplotlib.axes import Axes
 from memo import notebook
+from memo.gait import lookup
 
 matplotlib.use("Agg")
 
@@ -319,3 +320,82 @@ def test_a_person_alone_keeps_the_number(track):
     assert alone.people == [1, 1] and set(alone.columns["person"]) == {1}
     assert {event["person"] for event in alone.events} == {1}
     assert any(sentence.startswith("Walk 1 (person 1)") for sentence in alone.sentences)
+
+
+class Altered:
+    """A walk with some of its values replaced."""
+
+    def __init__(self, walk, **values):
+        self._walk, self._values = walk, values
+
+    def __getattr__(self, name):
+        values = self.__dict__["_values"]
+        return values[name] if name in values else getattr(self.__dict__["_walk"], name)
+
+    def __len__(self):
+        return len(self._walk)
+
+
+def altered(track, *walks):
+    other = copy.copy(track)
+    other.walks = list(walks)
+    other._people = {walk.person: 0 for walk in walks}
+    return other
+
+
+def test_the_speed_of_a_walk_backwards_has_one_sign_in_all_results(track):
+    walk = track.walks[0]
+    assert track.summary["speed_mps"] > 0.5
+    speeds = [
+        line if line.parameter != "speed" else type(line)("speed", "", -line.value, "m/s", -2.0, -0.5, line.n)
+        for line in walk.gait_parameters
+    ]
+    backwards = altered(track, Altered(walk, direction="backward", gait_parameters=speeds))
+    row = lookup(backwards.gait_parameters, 0, "speed")
+    assert backwards.summary["speed_mps"] == row["value"] < -0.5
+    assert "backwards" in backwards.summary["message"] and " at -" not in backwards.summary["message"]
+
+
+@pytest.mark.parametrize("open_by", ["p_swapped", "p_other_direction"])
+def test_a_walk_whose_sides_are_open_has_no_cycles_by_side(track, open_by):
+    walk = track.walks[0]
+    sure = altered(track, Altered(walk, p_swapped=0.1, p_other_direction=0.0))
+    unsure = altered(track, Altered(walk, **{"p_swapped": 0.1, "p_other_direction": 0.0, open_by: 0.42}))
+    assert len(sure.cycles["walk"]) and not len(unsure.cycles["walk"])
+    both = altered(track, unsure.walks[0], sure.walks[0])
+    assert set(both.cycles["walk"]) == {1}
+
+
+def test_a_person_who_cannot_have_walked_so_far_is_not_called_the_same(track):
+    walk = track.walks[0]
+    columns = walk.columns
+    for later_s, apart_m, is_same in (
+        (0.0, 6.2, False),
+        (0.0, 0.5, True),
+        (3.0, 6.2, True),
+        (-0.5, 3.0, False),
+    ):
+        moved = dict(columns)
+        moved["time_s"] = columns["time_s"] - columns["time_s"][0] + columns["time_s"][-1] + later_s
+        moved["x_m"] = columns["x_m"] - columns["x_m"][0] + columns["x_m"][-1] + apart_m
+        moved["y_m"] = columns["y_m"] - columns["y_m"][0] + columns["y_m"][-1]
+        said = " ".join(altered(track, walk, Altered(walk, columns=moved)).sentences)
+        assert ("This is the same person as in walk 0: it begins" in said) is is_same, said
+        assert ("the places do not agree" in said) is not is_same
+        assert f"{apart_m:.1f} m from where that walk ended" in said
+
+
+def test_a_video_of_another_size_is_refused(track):
+    width, height = track.walks[0].camera.size
+    for shrink in (0, -1, 1.5, True, 10**9, "2"):
+        with pytest.raises(ValueError, match="shrink must be a whole number from 1 to 1000, got"):
+            track.of_video(shrink)
+    with pytest.raises(
+        ValueError, match=f"size {width}x{height} averaged 2 by 2 is .*, but the tracked frames"
+    ):
+        track.of_video(2, (width, height))
+    whole = track.of_video(np.int64(2), (2 * width + 1, 2 * height))
+    assert tuple(whole.camera.size) == (2 * width + 1, 2 * height)
+    assert whole.of_video(4).shrink == 4
+    with pytest.raises(ValueError, match="shrink must be a multiple of 2, got 3"):
+        whole.of_video(3)

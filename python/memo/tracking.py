@@ -6,6 +6,7 @@ import copy
 import logging
 from collections.abc import Callable, Iterable, Mapping, Sequence, Sized
 from dataclasses import replace
+from numbers import Integral
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -291,6 +292,12 @@ def _feed(
 ALONG_SIGHT = float(np.cos(np.radians(35)))
 """Paths that are within this angle of the line of sight, as its cosine, lead towards the camera or away."""
 
+_MOST_SHRINK = 1000
+
+_REACH_M = 1.0
+_REACH_MPS = 2.5
+"""Nobody walks farther than this within a second; the places themselves may be off by `_REACH_M`."""
+
 _FRAMES = ("columns", "gait_parameters", "cycles")
 
 
@@ -334,11 +341,32 @@ class Track:
 
         It changes the columns in pixels, the contours and the camera.
         """
+        shrink = self._checked_shrink(shrink, size)
         scaled = copy.copy(self)
         scaled.shrink, scaled._video_size = shrink, size
         scaled.camera_motion = replace(self.camera_motion, shrink=shrink)
         scaled.left_out = [left.of_video(shrink // self.shrink) for left in self.left_out]
         return scaled
+
+    def _checked_shrink(self, shrink: int, size: tuple[int, int] | None) -> int:
+        """`shrink` of a video whose frames have the size of those that were tracked."""
+        is_whole = isinstance(shrink, Integral) and not isinstance(shrink, bool)
+        if not (is_whole and 1 <= shrink <= _MOST_SHRINK):
+            raise ValueError(f"shrink must be a whole number from 1 to {_MOST_SHRINK}, got {shrink!r}")
+        if shrink % self.shrink:
+            raise ValueError(
+                f"the track is of a video whose frames were averaged {self.shrink} by {self.shrink}: "
+                f"shrink must be a multiple of {self.shrink}, got {shrink}"
+            )
+        camera = self._main.camera if self._main is not None else self._camera
+        if size is not None and camera is not None:
+            averaged, tracked = tuple(side // shrink for side in size), tuple(camera.size)
+            if averaged != tracked:
+                of, wanted, got = ("x".join(map(str, sides)) for sides in (size, tracked, averaged))
+                raise ValueError(
+                    f"size {of} averaged {shrink} by {shrink} is {got}, but the tracked frames are {wanted}"
+                )
+        return int(shrink)
 
     @property
     def columns(self) -> dict[str, npt.NDArray[Any]]:
@@ -406,8 +434,9 @@ class Track:
 
     @property
     def cycles(self) -> dict[str, npt.NDArray[Any]]:
-        """The columns of `cycles.csv`: every gait cycle of each side at 0 to 100 %, and their mean."""
-        return cycle_table((walk.cycles for walk in self.walks), self.people)
+        """The columns of `cycles.csv`: every gait cycle of each side at 0 to 100 %, and their mean. A walk
+        whose sides are ambiguous has none, as it has no gait parameters by side."""
+        return cycle_table((walk.cycles if _has_sides(walk) else [] for walk in self.walks), self.people)
 
     @property
     def sentences(self) -> list[str]:
@@ -471,6 +500,12 @@ class Track:
         old, new = self.walks[before].columns, self.walks[index].columns
         apart_m = np.hypot(new["x_m"][0] - old["x_m"][-1], new["y_m"][0] - old["y_m"][-1])
         later_s = new["time_s"][0] - old["time_s"][-1]
+        if apart_m > _REACH_M + _REACH_MPS * max(later_s, 0.0):
+            return [
+                f"This may be the same person as in walk {before}, but the places do not agree: it begins "
+                f"{later_s:.1f} s later, {apart_m:.1f} m from where that walk ended, and nobody walks so far "
+                "in that time. At least one of the two is in a wrong place."
+            ]
         return [
             f"This is the same person as in walk {before}: it begins {later_s:.1f} s later, "
             f"{apart_m:.1f} m from where that walk ended."
@@ -569,7 +604,7 @@ class Track:
             "gait": main.direction,
             "p_other_gait": main.p_other_direction,
             "p_swapped": main.p_swapped,
-            "speed_mps": speed,
+            "speed_mps": -speed if main.direction == "backward" else speed,
             **treadmill_figures(main),
             "cadence_steps_per_min": cadence,
             "height_m": main.height.height_m,
@@ -718,6 +753,12 @@ def _is_in_place(walk: _memo.Walk) -> bool:
     return walk.fit.verdict != "poorly" if walk.fit is not None else walk.fit_problem is None
 
 
+def _has_sides(walk: _memo.Walk) -> bool:
+    """Whether it is known which side is which, and so whether values by side are stated."""
+    is_known = max(walk.p_swapped, walk.p_other_direction) <= LIKELY_MISTAKEN
+    return is_known and not is_heading_open(walk)
+
+
 _MOST_PARTS = 3
 
 
@@ -758,8 +799,8 @@ def fit_sentence(walk: _memo.Walk) -> str | None:
     if fit.off_parts:
         seen += f"; worst at {_parts_in_words(fit)}"
     unsure = "Check the overlay before use."
+    if fit.verdict == "poorly":
+        unsure = "The model may be in a wrong place: check the overlay, and do not use the angles."
     if all(np.isnan(walk.columns[name]).all() for name in _ANGLE_COLUMNS):
         unsure = "No joint angle is known well enough to be stated. " + unsure
     return f"The model fits the person {fit.verdict}: {seen}. {unsure}"
-    if fit.verdict == "poorly":
-        unsure = "The model may be in a wrong place: check the overlay, and do not use the angles."

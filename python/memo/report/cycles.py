@@ -58,7 +58,7 @@ def none_sentence(table: Mapping[str, npt.NDArray[Any]]) -> str:
         return "cycles.csv is not in the folder: track the video again with this memo."
     if not len(table["walk"]):
         return (
-            "There are no measured cycles: they need a fit of the person, walking forward, and an initial "
-            "contact in the video."
+            "There are no measured cycles: they need a fit of the person, walking forward, known sides, and "
+            "an initial contact in the video."
         )
     return ""
