@@ -124,12 +124,13 @@ def _check_frame(luma: Luma, track: Any, shrink: int) -> None:
     """Refuses a frame that is not one of the track's by its size."""
     if luma.ndim != 2:
         raise ValueError(f"a frame must be grey values of shape (height, width), got shape {luma.shape}")
-    if track.camera is None:
+    camera = getattr(track, "camera", None)
+    if camera is None:
         return
-    size, of_track = luma.shape[1::-1], tuple(track.camera.size)
+    size, of_track = luma.shape[1::-1], tuple(camera.size)
     # Averaging leaves out columns and rows at the border; the camera may not have those.
     could_be = [
-        whole - shrink < shrink * side < whole + track.shrink
+        whole - shrink < shrink * side < whole + getattr(track, "shrink", 1)
         for side, whole in zip(size, of_track, strict=True)
     ]
     if not all(could_be):
