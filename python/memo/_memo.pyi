@@ -95,6 +95,7 @@ __all__ = [
     "planar_hinges",
     "planar_rods",
     "pointlight",
+    "pointlight_cycle",
     "pointlight_together",
     "population_height_m",
     "posture",
@@ -868,6 +869,7 @@ def pointlight(
     scramble_limit_px: float | None = None,
     scramble_phase: str | None = None,
     period_s: float | None = None,
+    cycle_start_s: float | None = None,
     max_shift_s: float | None = None,
     lifetime_frames: int | None = None,
     life_dots: int | None = None,
@@ -881,6 +883,13 @@ def pointlight(
     noise_sd_px: float | None = None,
     seed: int | None = None,
 ) -> PointLightDisplay: ...
+def pointlight_cycle(
+    positions: Sequence[npt.NDArray[np.float64]],
+    times_s: Sequence[float] | npt.NDArray[np.float64],
+    names: Sequence[Sequence[str]],
+    *,
+    period_s: float | None = None,
+) -> tuple[float, float]: ...
 def pointlight_together(
     displays: Sequence[PointLightDisplay], offsets_px: Sequence[tuple[float, float]] | None = None
 ) -> PointLightDisplay: ...

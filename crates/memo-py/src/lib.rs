@@ -65,7 +65,7 @@ mod _memo {
     };
     #[pymodule_export]
     use super::pointlight::{
-        PointLightDisplay, WalkerMotion, pointlight, pointlight_together, walker_motion,
+        PointLightDisplay, WalkerMotion, pointlight, pointlight_cycle, pointlight_together, walker_motion,
     };
     #[pymodule_export]
     use super::posture::{PostureSequence, SecondMotion, posture, posture_tree};

@@ -10,7 +10,7 @@ use memo_core::model::GaitStyle;
 use memo_core::synth::{
     CycleOptions, DisplayView, DotPicture, DotShape, DotSource, LifeSites, LimitedLife, Locomotion,
     NoiseDots, NoiseKind, PhaseScramble, PointMotion, PositionScramble, SampledWalkOptions, ScrambleAxes,
-    WALKER_HEIGHT_M, displays_together,
+    WALKER_HEIGHT_M, common_cycle, displays_together,
 };
 use memo_core::wording::counted;
 use memo_core::{Body, Gait, PointLightOptions, Walker, point_light_display, sampled_walk, synth};
@@ -188,6 +188,31 @@ pub fn pointlight_together(
     PointLightDisplay::of(py, displays_together(&all, &offsets).map_err(value_error)?)
 }
 
+/// The cycle that several actors have in common: its period, and its start after the first frame, seconds.
+///
+/// `positions` and `names` have one entry per actor: points (T, K, 3) and their K names. All have the same times. The
+/// period, if it is not given, and the start are those that fit all actors best together. `memo.pointlight` takes them
+/// as `period_s` and `cycle_start_s`, so that the displays keep the timing between the actors.
+#[pyfunction]
+#[pyo3(signature = (positions, times_s, names, *, period_s=None))]
+pub fn pointlight_cycle(
+    py: Python<'_>,
+    positions: Vec<Bound<'_, PyAny>>,
+    times_s: Vec<f64>,
+    names: Vec<Vec<String>>,
+    period_s: Option<f64>,
+) -> PyResult<(f64, f64)> {
+    if positions.len() != names.len() {
+        let [actors, lists] = [counted(positions.len(), "actor"), counted(names.len(), "list")];
+        return Err(PyValueError::new_err(format!("positions are of {actors}, but names are {lists}")));
+    }
+    let each = positions.iter().zip(names);
+    let motions: Vec<_> =
+        each.map(|(points, names)| motion_of(points, times_s.clone(), names)).collect::<PyResult<_>>()?;
+    let cut = py.detach(|| common_cycle(&motions, period_s)).map_err(value_error)?;
+    Ok((cut.period_s, cut.start_s))
+}
+
 /// Motion of the body model walking through the origin.
 ///
 /// `cycles`, in place of `frames`: a whole number of gait cycles, each of a whole number of frames, so that the motion
@@ -240,8 +265,10 @@ const LOCOMOTIONS: [(&str, Locomotion); 3] = [
 ///
 /// `cycles`: one cycle of the motion, that many times, without a jump from its end to its start, `tempo` times as
 /// fast. `period_s`: its period, for `cycles` and `scramble_phase="periodic"`; by default the whole motion, if its end
-/// leads to its start, or else the lag at which it repeats itself best. `scramble_limit_px`: largest shift along each
-/// of `scramble_axes`; by default, the extent of the figure.
+/// leads to its start, or else the lag at which it repeats itself best. `cycle_start_s`: where the cycle starts, seconds
+/// after the first frame; by default where it closes best. `scramble_limit_px`: largest shift along each of
+/// `scramble_axes`; by default, the extent of the figure. `locomotion="pelvis"` needs both hips among the names;
+/// joints may have any usual name. `max_shift_s` needs `scramble_phase="shortened"`.
 ///
 /// Defaults: `azimuth_deg` 0, `elevation_deg` 0, `px_per_m` 200, `locomotion` "treadmill", `tempo` 1,
 /// `scramble_axes` "both", `max_shift_s` 0.5, `life_dots` 8, `life_sites` "limbs", `noise_dots` 0,
@@ -251,7 +278,7 @@ const LOCOMOTIONS: [(&str, Locomotion); 3] = [
     positions, times_s, names, *, azimuth_deg=None, elevation_deg=None, px_per_m=None, camera=None,
     locomotion=None, cycles=None, tempo=None, inverted=false, mirrored=false, reversed=false,
     scramble_position=false, scramble_axes=None, scramble_limit_px=None, scramble_phase=None, period_s=None,
-    max_shift_s=None, lifetime_frames=None, life_dots=None, life_sites=None, limbs=None, synchronous=false,
+    cycle_start_s=None, max_shift_s=None, lifetime_frames=None, life_dots=None, life_sites=None, limbs=None, synchronous=false,
     noise_dots=None, noise_kind=None, noise_area=None, noise_speed_px_s=None, noise_sd_px=None, seed=None
 ))]
 #[allow(clippy::too_many_arguments, reason = "each is one of the usual conditions of a display")]
@@ -275,6 +302,7 @@ pub fn pointlight(
     scramble_limit_px: Option<f64>,
     scramble_phase: Option<&str>,
     period_s: Option<f64>,
+    cycle_start_s: Option<f64>,
     max_shift_s: Option<f64>,
     lifetime_frames: Option<usize>,
     life_dots: Option<usize>,
@@ -302,8 +330,9 @@ pub fn pointlight(
         is_reversed: reversed,
         cycles: repeated(cycles, tempo)?,
         period_s,
+        cycle_start_s,
         scrambles_position: moved(scramble_position, scramble_axes, scramble_limit_px)?,
-        scrambles_phase: scramble_phase.map(|kind| shifts(kind, max_shift_s)).transpose()?,
+        scrambles_phase: shifts(scramble_phase, max_shift_s)?,
         limited_life: lifetime_frames.map(life).transpose()?,
         noise_dots: noise(noise_dots, noise_kind, noise_area, noise_speed_px_s)?,
         noise_sd_px: noise_sd_px.unwrap_or(usual.noise_sd_px),
@@ -364,11 +393,15 @@ fn moved(is_moved: bool, axes: Option<&str>, limit_px: Option<f64>) -> PyResult<
     Ok(is_moved.then_some(PositionScramble { axes, limit_px }))
 }
 
-fn shifts(kind: &str, max_shift_s: Option<f64>) -> PyResult<PhaseScramble> {
-    let max_shift_s = max_shift_s.unwrap_or(PhaseScramble::MAX_SHIFT_S);
-    let kinds =
-        [("periodic", PhaseScramble::Periodic), ("shortened", PhaseScramble::Shortened { max_shift_s })];
-    chosen("scramble_phase", kind, kinds)
+fn shifts(kind: Option<&str>, max_shift_s: Option<f64>) -> PyResult<Option<PhaseScramble>> {
+    let shortened =
+        PhaseScramble::Shortened { max_shift_s: max_shift_s.unwrap_or(PhaseScramble::MAX_SHIFT_S) };
+    let kinds = [("periodic", PhaseScramble::Periodic), ("shortened", shortened)];
+    let kind = kind.map(|name| chosen("scramble_phase", name, kinds)).transpose()?;
+    if max_shift_s.is_some() && !matches!(kind, Some(PhaseScramble::Shortened { .. })) {
+        return Err(PyValueError::new_err("max_shift_s needs scramble_phase \"shortened\""));
+    }
+    Ok(kind)
 }
 
 fn limited_life(

@@ -11,9 +11,9 @@ pub use motion::{
     MotionError, PointMotion, SampledWalkOptions, WALKER_HEIGHT_M, WALKER_LIMBS, WALKER_NAMES, limbs_of,
 };
 pub use pointlight::{
-    CycleOptions, DisplayView, DotPicture, DotShape, DotSource, LifeSites, LimitedLife, Locomotion,
+    CycleCut, CycleOptions, DisplayView, DotPicture, DotShape, DotSource, LifeSites, LimitedLife, Locomotion,
     NoiseDots, NoiseKind, PhaseScramble, PointLightDisplay, PointLightError, PositionScramble, ScrambleAxes,
-    displays_together,
+    common_cycle, displays_together,
 };
 pub use random::Random;
 pub use scene::{SceneError, SceneOptions, Truth, Uneven};

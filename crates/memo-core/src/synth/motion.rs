@@ -4,6 +4,7 @@
 //! A NaN coordinate means that the point is unknown at that instant.
 
 use super::scene::stride_length_m;
+use crate::keypoints::joint_name;
 use crate::model::body::Part;
 use crate::model::{PosedBody, Walker};
 use crate::wording::counted;
@@ -178,13 +179,18 @@ impl PointMotion {
         if last == 0 { 0.0 } else { (self.times_s[last] - self.times_s[0]) / last as f64 }
     }
 
-    /// Position of the body in each frame: the midpoint of the hips if both are among the points, otherwise
-    /// the mean of the points known in all frames, otherwise of those known in the frame. Gaps repeat the
-    /// previous position.
+    /// Indices of the right and the left hip, by any name that [`joint_name`] knows, if both are among the
+    /// points.
+    pub fn hips(&self) -> Option<[usize; 2]> {
+        Some([index_of_joint(&self.names, "RHP")?, index_of_joint(&self.names, "LHP")?])
+    }
+
+    /// Position of the body in each frame: the midpoint of the [hips](Self::hips) if both are among the points,
+    /// otherwise the mean of the points known in all frames, otherwise of those known in the frame. Gaps repeat
+    /// the previous position.
     pub fn pelvis_path(&self) -> Vec<DVec3> {
         let always = |k: &usize| (0..self.frames()).all(|frame| self.at(frame, *k).is_some());
-        let hips: Vec<usize> = ["RHP", "LHP"].iter().filter_map(|name| self.index_of(name)).collect();
-        let mut anchors = if hips.len() == 2 { hips } else { (0..self.points()).collect() };
+        let mut anchors = self.hips().map_or_else(|| (0..self.points()).collect(), |hips| hips.to_vec());
         if anchors.iter().any(&always) {
             anchors.retain(|k| always(k));
         }
@@ -214,6 +220,17 @@ impl PointMotion {
         Self { positions, names: self.names.clone(), times_s }
     }
 
+    /// The points of all motions as those of one, at the times of the first. All need as many frames.
+    pub(super) fn beside(motions: &[Self]) -> Self {
+        let frame = |t: usize| {
+            motions.iter().flat_map(move |one| &one.positions[t * one.points()..(t + 1) * one.points()])
+        };
+        let times_s = motions.first().map_or(Vec::new(), |first| first.times_s.clone());
+        let positions = (0..times_s.len()).flat_map(frame).copied().collect();
+        let names = motions.iter().flat_map(|one| one.names.clone()).collect();
+        Self { positions, names, times_s }
+    }
+
     /// The first `frames` frames.
     pub(super) fn truncated(mut self, frames: usize) -> Self {
         self.positions.truncate(frames * self.points());
@@ -222,9 +239,17 @@ impl PointMotion {
     }
 }
 
-/// The limb segments whose two ends are among the names, as pairs of indices.
+/// The place of a joint among names: of this name, or of another one for the same joint.
+fn index_of_joint(names: &[String], wanted: &str) -> Option<usize> {
+    let joint = joint_name(wanted).ok();
+    let is_it = |name: &String| joint.is_some() && joint_name(name).ok() == joint;
+    names.iter().position(|name| name == wanted).or_else(|| names.iter().position(is_it))
+}
+
+/// The limb segments whose two ends are among the names, as pairs of indices. Joints may have any name that
+/// [`joint_name`] knows.
 pub fn limbs_of(names: &[String]) -> Vec<[usize; 2]> {
-    let index = |name: &str| names.iter().position(|n| n == name);
+    let index = |name: &str| index_of_joint(names, name);
     WALKER_LIMBS.iter().filter_map(|[a, b]| Some([index(a)?, index(b)?])).collect()
 }
 
@@ -366,6 +391,35 @@ mod tests {
         }
         assert!(SampledWalkOptions::default().of_whole_cycles(&walker, 0).is_err());
         assert!(SampledWalkOptions::default().of_whole_cycles(&walker, usize::MAX).is_err());
+    }
+
+    #[test]
+    fn joints_are_found_by_any_of_their_names() {
+        let motion = walk(&SampledWalkOptions::default()).unwrap();
+        let renamed = |names: [&str; 13]| {
+            let names = names.map(String::from).to_vec();
+            PointMotion::new(motion.positions().to_vec(), names, motion.times_s().to_vec()).unwrap()
+        };
+        let other = renamed([
+            "RShoulder",
+            "RElbow",
+            "RWrist",
+            "LShoulder",
+            "LElbow",
+            "LWrist",
+            "RHip",
+            "right_knee",
+            "R_ANKLE",
+            "left_hip",
+            "LKnee",
+            "LAnkle",
+            "Head",
+        ]);
+        assert_eq!(other.hips(), Some([6, 9]));
+        assert_eq!(other.pelvis_path(), motion.pelvis_path());
+        assert_eq!(limbs_of(other.names()), limbs_of(motion.names()));
+        let unnamed = renamed(["a", "b", "c", "d", "e", "f", "g", "h", "i", "j", "k", "l", "RHP"]);
+        assert_eq!(unnamed.hips(), None);
     }
 
     #[test]

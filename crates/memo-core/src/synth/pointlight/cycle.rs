@@ -4,9 +4,9 @@
 //! taken out evenly over the cycle, point by point. The end of the cycle then turns into what precedes its
 //! start, if that was recorded, so that the velocity does not jump either. The cycle is sampled in whole frames.
 
-use super::PointLightError;
 use super::course::Course;
 use super::period::{closes_itself, found_period, mean};
+use super::{CycleCut, PointLightError};
 use crate::OptionError;
 use crate::synth::motion::PointMotion;
 use glam::DVec3;
@@ -29,10 +29,31 @@ const TURN: f64 = 0.1;
 /// Largest change of the speed, and of its inverse.
 const MOST_TEMPO: f64 = 10.0;
 
-/// One cycle of a motion, played `tempo` times as fast. The period is found if it is not given.
+/// The cycle that several motions at the same times have in common: the period, if it is not given, and the start
+/// are those that fit all of them best together. Displays that repeat it keep the timing between the actors.
+///
+/// # Errors
+///
+/// No motion, motions at different times, a period out of range, or none that fits.
+pub fn common_cycle(motions: &[PointMotion], period_s: Option<f64>) -> Result<CycleCut, PointLightError> {
+    let first = motions.first().ok_or(PointLightError::NoActor)?;
+    if let Some(actor) = motions.iter().position(|other| other.times_s() != first.times_s()) {
+        let [frames, others] = [first.frames(), motions[actor].frames()];
+        return Err(PointLightError::Clocks { actor, frames, others });
+    }
+    let stills: Vec<PointMotion> = motions.iter().map(|one| Course::of(one).still).collect();
+    let (still, interval_s) = (PointMotion::beside(&stills), first.frame_interval_s());
+    let is_closed = closes_itself(&still);
+    let period = period_of(&still, interval_s, period_s, is_closed)?;
+    let start = if is_closed { 0.0 } else { best_start(&still, period) as f64 };
+    Ok(CycleCut { period_s: period * interval_s, start_s: start * interval_s })
+}
+
+/// One cycle of a motion, played `tempo` times as fast. The period and the start are found if they are not given.
 pub(super) fn closed_cycle(
     motion: &PointMotion,
     period_s: Option<f64>,
+    start_s: Option<f64>,
     tempo: f64,
 ) -> Result<Cycle, PointLightError> {
     let is_possible = (1.0 / MOST_TEMPO..=MOST_TEMPO).contains(&tempo);
@@ -40,13 +61,13 @@ pub(super) fn closed_cycle(
     let (course, interval_s) = (Course::of(motion), motion.frame_interval_s());
     let (still, whole) = (&course.still, motion.frames() as f64);
     let is_closed = closes_itself(still);
-    let period = match period_s {
-        Some(period_s) => asked_period(period_s, interval_s, motion.frames())?,
-        None if is_closed => part_of(whole, found_period(still, interval_s).ok()),
-        None => found_period(still, interval_s)?,
-    };
+    let period = period_of(still, interval_s, period_s, is_closed)?;
     let frames = ((period / tempo).round() as usize).max(1);
-    let start = if is_closed { 0.0 } else { best_start(still, period) as f64 };
+    let start = match start_s {
+        Some(start_s) => asked_start(start_s, period, interval_s, motion.frames())?,
+        None if is_closed => 0.0,
+        None => best_start(still, period) as f64,
+    };
     let turn = if start >= TURN * period { TURN } else { 0.0 };
     let of_point = |k: usize| move |frame: usize| still.at(frame, k).unwrap_or(DVec3::NAN);
     let path = still.pelvis_path();
@@ -93,6 +114,28 @@ impl Cycle {
 fn turned(from: DVec3, to: DVec3, done: f64) -> DVec3 {
     let is_turning = done > 0.0 && !to.is_nan();
     if is_turning { from.lerp(to, done * done * (3.0 - 2.0 * done)) } else { from }
+}
+
+/// The period of a motion on the spot in frames, found if it is not given.
+fn period_of(
+    still: &PointMotion,
+    interval_s: f64,
+    period_s: Option<f64>,
+    is_closed: bool,
+) -> Result<f64, PointLightError> {
+    match period_s {
+        Some(period_s) => asked_period(period_s, interval_s, still.frames()),
+        None if is_closed => Ok(part_of(still.frames() as f64, found_period(still, interval_s).ok())),
+        None => found_period(still, interval_s),
+    }
+}
+
+/// A start in whole frames, after which there is a whole period.
+fn asked_start(start_s: f64, period: f64, interval_s: f64, frames: usize) -> Result<f64, PointLightError> {
+    let start = if interval_s > 0.0 { (start_s / interval_s).round() } else { start_s };
+    let is_possible = start == 0.0 || (start > 0.0 && start + period <= frames as f64);
+    OptionError::unless(is_possible, "cycle_start_s", "at least 0 and before a whole cycle", start_s)?;
+    Ok(start)
 }
 
 /// A period in frames; within a frame of the whole motion, it is the whole motion.

@@ -20,9 +20,10 @@ mod options;
 mod period;
 mod picture;
 
+pub use cycle::common_cycle;
 pub use options::{
-    CycleOptions, DisplayView, LifeSites, LimitedLife, Locomotion, NoiseDots, NoiseKind, PhaseScramble,
-    PointLightError, PointLightOptions, PositionScramble, ScrambleAxes,
+    CycleCut, CycleOptions, DisplayView, LifeSites, LimitedLife, Locomotion, NoiseDots, NoiseKind,
+    PhaseScramble, PointLightError, PointLightOptions, PositionScramble, ScrambleAxes,
 };
 pub use picture::{DotPicture, DotShape};
 
@@ -93,23 +94,27 @@ impl PointLightDisplay {
 ///
 /// # Errors
 ///
-/// An option out of range, a motion that is too short for the phase scrambling, limbs or joints that the
-/// limited lifetime needs but the motion lacks, too many dots, or a motion of which no point is visible.
+/// An option out of range, a motion that is too short for the phase scrambling, hips, limbs or joints that the
+/// fixed pelvis or the limited lifetime needs but the motion lacks, too many dots, or a motion of which no point is visible.
 pub fn point_light_display(
     motion: &PointMotion,
     options: &PointLightOptions,
 ) -> Result<PointLightDisplay, PointLightError> {
     checked(options)?;
+    if options.locomotion == Locomotion::PelvisFixed && motion.hips().is_none() {
+        let shown: Vec<&str> = motion.names().iter().take(5).map(String::as_str).collect();
+        return Err(PointLightError::NoHips { names: shown.join(", ") });
+    }
     let (course, period_s) = course_of(motion, options)?;
     check_dots(course.still.frames(), motion, options)?;
     let unscrambled = course.clone().shown(options.locomotion);
+    let middle = Figure::seen(&unscrambled, &options.view)?.extent().middle();
     let centre_px = match &options.view {
         DisplayView::Perspective(camera) => 0.5 * (DVec2::from(camera.size.map(f64::from)) - 1.0),
-        DisplayView::Orthographic { .. } => Figure::seen(&unscrambled, &options.view)?.extent().middle(),
+        DisplayView::Orthographic { .. } => middle,
     };
     let motion = phase_scrambled(course, period_s, options)?.shown(options.locomotion);
     let mut figure = Figure::seen(&motion, &options.view)?;
-    let middle = figure.extent().middle();
     if let Some(scramble) = &options.scrambles_position {
         figure.scramble_positions(scramble, &mut stream(options.seed, 2));
     }
@@ -197,7 +202,7 @@ fn course_of(
         (None, Some(PhaseScramble::Periodic)) => (None, 1.0),
         (None, _) => return Ok((prepared(Course::of(motion), options), None)),
     };
-    let cycle = closed_cycle(motion, options.period_s, tempo)?;
+    let cycle = closed_cycle(motion, options.period_s, options.cycle_start_s, tempo)?;
     let frames = repetitions.map_or(motion.frames(), |cycles| cycle.frames.saturating_mul(cycles));
     check_dots(frames, motion, options)?;
     Ok((prepared(cycle.repeated(frames, motion), options), Some(cycle.period_s())))
@@ -293,6 +298,9 @@ fn checked(options: &PointLightOptions) -> Result<(), PointLightError> {
     let is_periodic = options.scrambles_phase == Some(PhaseScramble::Periodic);
     match options.period_s {
         Some(_) if options.cycles.is_none() && !is_periodic => Err(PointLightError::IdlePeriod),
+        _ if options.cycle_start_s.is_some() && options.cycles.is_none() && !is_periodic => {
+            Err(PointLightError::IdleStart)
+        }
         _ => Ok(()),
     }
 }

@@ -38,6 +38,20 @@ pub enum PointLightError {
     /// There is a period, but no cycle is repeated and no phase is shifted by it.
     #[error("period_s has an effect only with cycles or with scramble_phase \"periodic\"")]
     IdlePeriod,
+    /// There is a start, but no cycle is cut out.
+    #[error("cycle_start_s has an effect only with cycles or with scramble_phase \"periodic\"")]
+    IdleStart,
+    /// The pelvis is to be fixed, but the motion has no hips.
+    #[error(
+        "locomotion \"pelvis\" needs a right and a left hip: names such as RHP and LHP wanted, got {names}"
+    )]
+    NoHips {
+        /// The first names of the motion, with commas.
+        names: String,
+    },
+    /// There is no motion.
+    #[error("wanted the motion of at least one actor, got none")]
+    NoActor,
     /// Displays of several actors need one offset for each.
     #[error("wanted displays with an offset each, got {} and {}", counted(*displays, "display"), counted(*offsets, "offset"))]
     Actors {
@@ -46,8 +60,8 @@ pub enum PointLightError {
         /// Number of offsets.
         offsets: usize,
     },
-    /// Displays of several actors have different times.
-    #[error("the display of actor {actor} has other times than that of actor 0: {} after {}", counted(*others, "frame"), counted(*frames, "frame"))]
+    /// Displays or motions of several actors have different times.
+    #[error("actor {actor} has other times than actor 0: {} after {}", counted(*others, "frame"), counted(*frames, "frame"))]
     Clocks {
         /// Index of the actor.
         actor: usize,
@@ -131,7 +145,8 @@ pub enum Locomotion {
     /// The straight motion at constant speed is removed; the body still moves up and down, sideways and back
     /// and forth.
     Treadmill,
-    /// The midpoint of the hips (or of all points, if there are no hips) is fixed.
+    /// The midpoint of the hips is fixed. The motion needs both, by any name that
+    /// [`joint_name`](crate::keypoints::joint_name) knows.
     PelvisFixed,
 }
 
@@ -149,6 +164,15 @@ impl Default for CycleOptions {
     fn default() -> Self {
         Self { cycles: 1, tempo: 1.0 }
     }
+}
+
+/// Where a cycle is in a motion.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CycleCut {
+    /// Its duration, seconds.
+    pub period_s: f64,
+    /// Its start, seconds after the first frame.
+    pub start_s: f64,
 }
 
 /// Phase scrambling: the trajectory of each point on the spot is shifted in time by its own random amount.
@@ -274,10 +298,11 @@ pub struct PointLightOptions {
     pub view: DisplayView,
     /// Whether the forward motion is kept or removed.
     pub locomotion: Locomotion,
-    /// Inverted: the display is flipped about the horizontal line through its middle; the facing direction
-    /// does not change.
+    /// Inverted: the display is flipped about the horizontal line through the middle of the figure before
+    /// scrambling; the facing direction does not change.
     pub is_inverted: bool,
-    /// Mirrored about the vertical line through the middle: the figure faces the other way.
+    /// Mirrored about the vertical line through the middle of the figure before scrambling, which then faces the
+    /// other way.
     pub is_mirrored: bool,
     /// Time-reversed.
     pub is_reversed: bool,
@@ -286,6 +311,10 @@ pub struct PointLightOptions {
     /// Period of the motion, seconds, for `cycles` and periodic phase scrambling. By default, the whole motion if
     /// its end leads to its start, otherwise the lag at which the motion repeats itself best.
     pub period_s: Option<f64>,
+    /// Start of the cycle, seconds after the first frame of the motion; the nearest frame is taken. By default,
+    /// where the motion differs least from itself one period later. [`common_cycle`](super::common_cycle) finds
+    /// one for several actors.
+    pub cycle_start_s: Option<f64>,
     /// Position scrambling.
     pub scrambles_position: Option<PositionScramble>,
     /// Phase scrambling.
@@ -309,6 +338,7 @@ impl Default for PointLightOptions {
             is_reversed: false,
             cycles: None,
             period_s: None,
+            cycle_start_s: None,
             scrambles_position: None,
             scrambles_phase: None,
             limited_life: None,

@@ -271,6 +271,14 @@ fn bad_options_are_refused_with_their_values() {
         assert!(refused(PointLightOptions { cycles: Some(repeated), ..fresh() }).contains("tempo"));
     }
     assert!(refused(PointLightOptions { period_s: Some(1.0), ..fresh() }).contains("only with cycles"));
+    assert!(refused(PointLightOptions { cycle_start_s: Some(0.0), ..fresh() }).contains("only with cycles"));
+    for bad in [f64::NAN, -1.0, 1.0] {
+        let cycles = Some(CycleOptions::default());
+        assert!(
+            refused(PointLightOptions { cycles, cycle_start_s: Some(bad), ..fresh() })
+                .contains("cycle_start_s")
+        );
+    }
     let none = CycleOptions { cycles: 0, tempo: 1.0 };
     assert!(refused(PointLightOptions { cycles: Some(none), ..fresh() }).contains("cycles"));
     let endless = CycleOptions { cycles: usize::MAX, tempo: 1.0 };
@@ -284,6 +292,11 @@ fn bad_options_are_refused_with_their_values() {
     let noise_dots = Some(NoiseDots { count: usize::MAX, ..NoiseDots::default() });
     assert!(refused(PointLightOptions { noise_dots, ..fresh() }).contains("too many"));
     let one = PointMotion::new(vec![DVec3::ZERO], vec!["dot".into()], vec![0.0]).unwrap();
+    let fixed = PointLightOptions { locomotion: Locomotion::PelvisFixed, ..fresh() };
+    assert_eq!(
+        point_light_display(&one, &fixed).unwrap_err().to_string(),
+        "locomotion \"pelvis\" needs a right and a left hip: names such as RHP and LHP wanted, got dot"
+    );
     let everything = PointLightOptions {
         scrambles_position: Some(PositionScramble::default()),
         is_inverted: true,
@@ -328,6 +341,40 @@ fn a_cycle_repeats_without_a_jump_and_keeps_its_period() {
             assert!(at_seam <= 1.5 * within, "{locomotion:?}, dot {k}: {at_seam} after {within} px");
         }
     }
+}
+
+#[test]
+fn actors_keep_their_timing_in_a_common_cycle() {
+    let one = recording();
+    let late = |frames: usize| {
+        let at = |t: usize| one.positions()[t * 13..(t + 1) * 13].to_vec();
+        let positions = (0..140).flat_map(|t| at(t + frames)).collect();
+        PointMotion::new(positions, one.names().to_vec(), one.times_s()[..140].to_vec()).unwrap()
+    };
+    let (first, second) = (late(0), late(20));
+    let cut = common_cycle(&[first.clone(), second.clone()], None).unwrap();
+    let cycle_s = SampledWalkOptions::default().cycle_s(&walker());
+    assert!((cut.period_s - cycle_s).abs() < 0.02, "{cut:?}");
+    let options = PointLightOptions {
+        cycles: Some(CycleOptions::default()),
+        period_s: Some(cut.period_s),
+        cycle_start_s: Some(cut.start_s),
+        ..PointLightOptions::default()
+    };
+    let [shown, other] = [&first, &second].map(|motion| point_light_display(motion, &options).unwrap());
+    let frames = shown.times_s.len();
+    let apart = |shift: usize| -> f64 {
+        let moved =
+            |d: &PointLightDisplay, t: usize| d.at(t % frames, 8).unwrap() - d.at(t % frames, 6).unwrap();
+        (0..frames).map(|t| (moved(&shown, t + shift) - moved(&other, t)).length_squared()).sum()
+    };
+    let best = (0..frames).min_by(|a, b| apart(*a).total_cmp(&apart(*b))).unwrap();
+    assert!((19..=21).contains(&best), "{best} frames of {frames}");
+    assert_eq!(common_cycle(&[], None), Err(PointLightError::NoActor));
+    assert!(matches!(
+        common_cycle(&[first, recording()], None),
+        Err(PointLightError::Clocks { actor: 1, .. })
+    ));
 }
 
 #[test]
