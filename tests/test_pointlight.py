@@ -4,6 +4,7 @@ import csv
 import json
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import memo
 import numpy as np
@@ -367,6 +368,161 @@ def test_several_actors_share_the_noise_dots_and_loop_only_with_equal_cycles(tmp
     assert code == 1 and "take 1.267, 0.8 s" in err and "leave --cycles out" in err
     code, said, err = memo_command("pointlight", files[0], files[0], "--cycles", "2", *common)
     assert code == 0 and " loops." in said, err
+
+
+def written_dots(folder):
+    """Pixels (T, N, 2) of `dots.csv`, and the names of the dots."""
+    with open(folder / "dots.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    names = [name.removesuffix("_u_px") for name in rows[0] if name.endswith("_u_px")]
+    return np.array([[[float(row[f"{n}_{x}_px"]) for x in "uv"] for n in names] for row in rows]), names
+
+
+def actor(path, number, *, frames=slice(None), shift_m=(0, 0, 0), noise_m=0.0, **walk):
+    """Writes a walker as the file of one actor."""
+    made = memo.walker_motion(200, **walk)
+    noise = np.random.default_rng(number).normal(size=made.positions.shape) * noise_m
+    points = (made.positions + noise + np.array(shift_m))[frames]
+    write_table(path, SimpleNamespace(positions=points, times_s=made.times_s[frames], names=made.names))
+    return path
+
+
+@pytest.mark.parametrize("noise_m", [0.0, 0.004])
+def test_actors_keep_their_timing_in_repeated_cycles(tmp_path, memo_command, noise_m):
+    files = [
+        actor(tmp_path / f"{k}.csv", k, phase=phase, noise_m=noise_m, shift_m=(2 * k, 0, 0))
+        for k, phase in enumerate((0.0, 0.3))
+    ]
+    code, said, err = memo_command(
+        "pointlight", *files, "--cycles", "1", "--size", "64x64", "--out", tmp_path / "out"
+    )
+    assert code == 0 and " loops." in said, err
+    uv, names = written_dots(tmp_path / "out")
+    step = [uv[:, names.index(f"actor{k}_RAN"), 0] - uv[:, names.index(f"actor{k}_RHP"), 0] for k in (1, 2)]
+    first, second = (np.angle(np.fft.fft(one)[1]) / (2 * np.pi) for one in step)
+    assert (second - first) % 1 == pytest.approx(0.3, abs=0.01)
+
+
+def test_a_scene_of_actors_is_flipped_as_a_whole(tmp_path, memo_command):
+    files = [
+        actor(tmp_path / "a.csv", 0, frames=slice(0, 60), shift_m=(-1, 0, 0)),
+        actor(tmp_path / "b.csv", 1, frames=slice(0, 60), shift_m=(1, 0, 0), height_m=1.2, heading_deg=180.0),
+    ]
+    shown = {}
+    for options in ("", "--mirrored", "--inverted", "--apart-m 2 --mirrored", "--apart-m 2"):
+        out = tmp_path / "out"
+        code, _, err = memo_command("pointlight", *files, *options.split(), "--size", "64x64", "--out", out)
+        assert code == 0, err
+        shown[options] = written_dots(out)[0]
+    for flipped, as_recorded, axis in (
+        ("--mirrored", "", 0),
+        ("--inverted", "", 1),
+        ("--apart-m 2 --mirrored", "--apart-m 2", 0),
+    ):
+        sums = shown[flipped][..., axis] + shown[as_recorded][..., axis]
+        assert np.ptp(sums) < 1e-3, flipped  # one line for all dots of all actors
+        other = 1 - axis
+        assert np.allclose(shown[flipped][..., other], shown[as_recorded][..., other], atol=1e-3)
+
+
+def test_actors_side_by_side_stay_on_their_ground(tmp_path, memo_command):
+    files = [
+        actor(tmp_path / "a.csv", 0),
+        actor(tmp_path / "b.csv", 1, height_m=1.2),
+    ]
+    shown = []
+    for options in ([], ["--apart-m", "1.5"]):
+        out = tmp_path / "out"
+        code, _, err = memo_command("pointlight", *files, *options, "--size", "64x64", "--out", out)
+        assert code == 0, err
+        shown.append(written_dots(out)[0])
+    assert np.allclose(shown[0][..., 1], shown[1][..., 1], atol=1e-3)
+    left, right = (shown[1][:, part, 0] for part in (slice(13), slice(13, None)))
+    middles = [(part.min() + part.max()) / 2 for part in (left, right)]
+    assert middles[1] - middles[0] == pytest.approx(1.5 * 200, abs=0.01)
+    for apart in ("nan", "0", "-1", "1e9"):
+        code, _, err = memo_command("pointlight", *files, "--apart-m", apart, "--size", "64x64")
+        assert code == 2 and err.startswith("memo: --apart-m ") and "offsets_px" not in err, err
+
+
+def test_files_of_one_recording_keep_their_clock(tmp_path, memo_command):
+    whole = actor(tmp_path / "a.csv", 0, frames=slice(0, 120))
+    late = actor(tmp_path / "b.csv", 0, frames=slice(30, 150))
+    out = tmp_path / "out"
+    common = ["--locomotion", "translating", "--size", "64x64", "--out", out]
+    code, said, err = memo_command("pointlight", whole, late, *common)
+    assert code == 0 and "Cut to the 90 frames from 0.5 to 1.983 s, which all motions have in common." in said
+    uv, _ = written_dots(out)
+    assert np.allclose(uv[:, :13], uv[:, 13:], atol=1e-3) and len(uv) == 90  # the same person twice
+    later = actor(tmp_path / "c.csv", 0, frames=slice(140, 200))
+    code, said, err = memo_command("pointlight", whole, later, *common)
+    assert code == 0 and "recorded at different times: all begin with their first frames." in said, err
+    assert "Cut to 60 frames, the length of the shortest motion." in said
+    assert len(written_dots(out)[0]) == 60
+
+
+def test_the_file_of_an_actor_is_named_in_errors(tmp_path, memo_command):
+    files = [actor(tmp_path / "a.csv", 0), actor(tmp_path / "b.csv", 1, frames=slice(0, 20))]
+    for wrong in (files, files[::-1]):
+        code, _, err = memo_command("pointlight", *wrong, "--cycles", "1", "--out", tmp_path / "out")
+        assert code == 1 and err.startswith(f"memo: {wrong[0]}: no period found"), err
+    code, _, err = memo_command("pointlight", *files, "--noise-dots", "9", "--noise-area", "2000")
+    assert code == 1 and err.startswith("memo: --noise-area must be"), err
+
+
+def test_the_pelvis_is_fixed_by_any_name_of_the_hips():
+    hips = [WALKER.names.index(name) for name in ("RHP", "LHP")]
+    for right, left in (("RHP", "LHP"), ("RHip", "LHip"), ("right_hip", "left_hip"), ("R_HIP", "L_HIP")):
+        names = list(WALKER.names)
+        names[hips[0]], names[hips[1]] = right, left
+        display = memo.pointlight(WALKER.positions, WALKER.times_s, names, locomotion="pelvis")
+        assert np.ptp(display.positions_px[:, hips].mean(axis=1), axis=0).max() < 1e-9
+    with pytest.raises(
+        ValueError, match=r"needs a right and a left hip: names such as RHP and LHP wanted, got a, b"
+    ):
+        memo.pointlight(WALKER.positions[:, :2], WALKER.times_s, ["a", "b"], locomotion="pelvis")
+
+
+def test_a_common_cycle_is_found_for_several_actors():
+    one, other = memo.walker_motion(150), memo.walker_motion(150, phase=0.4)
+    period_s, start_s = memo.pointlight_cycle(
+        [one.positions, other.positions], one.times_s, [one.names, other.names]
+    )
+    assert period_s == pytest.approx(one.cycle_s, abs=0.02) and 0 <= start_s <= 150 / 60 - period_s
+    with pytest.raises(ValueError, match="at least one actor"):
+        memo.pointlight_cycle([], one.times_s, [])
+    with pytest.raises(ValueError, match="positions are of 1 actor, but names are 2 lists"):
+        memo.pointlight_cycle([one.positions], one.times_s, [one.names, one.names])
+    for start in (-1.0, float("nan"), 2.4):
+        with pytest.raises(ValueError, match="cycle_start_s must be"):
+            memo.pointlight(one.positions, one.times_s, one.names, cycles=1, cycle_start_s=start)
+
+
+def test_idle_shifts_and_starts_are_refused():
+    for options, words in (
+        ({"max_shift_s": 0.1}, "max_shift_s needs scramble_phase"),
+        ({"max_shift_s": float("nan")}, "max_shift_s needs scramble_phase"),
+        ({"max_shift_s": 0.1, "scramble_phase": "periodic", "cycles": 1}, "max_shift_s needs scramble_phase"),
+        ({"cycle_start_s": 0.1}, "cycle_start_s has an effect only with cycles"),
+    ):
+        with pytest.raises(ValueError, match=words):
+            memo.pointlight(*MOTION, **options)
+
+
+def test_the_size_of_a_video_with_odd_sides_is_stated(tmp_path, memo_command):
+    common = ["pointlight", "--seconds", "0.1", "--out", tmp_path]
+    av = pytest.importorskip("av")
+    for size, shown, lossless in (
+        ("33x21", (34, 22), False),
+        ("33x21", (33, 21), True),
+        ("32x22", (32, 22), False),
+    ):
+        code, said, err = memo_command(*common, "--size", size, *["--lossless"] * lossless)
+        assert code == 0, err
+        with av.open(str(tmp_path / ("display.mkv" if lossless else "display.mp4"))) as video:
+            stream = video.streams.video[0]
+            assert (stream.width, stream.height) == shown
+        assert ("display.mp4 is 34x22" in said) is (shown == (34, 22))
 
 
 def test_the_command_reports_dots_that_leave_the_picture_and_refuses_bad_pictures(tmp_path, memo_command):

@@ -23,7 +23,7 @@ from memo._memo import PointLightDisplay
 from memo.overlay import _h264
 from memo.unfinished import complete_file, complete_folder
 
-__all__ = ["frames_left", "remove_display", "write_display_png", "write_display_video"]
+__all__ = ["even_size", "frames_left", "remove_display", "write_display_png", "write_display_video"]
 
 _MILLISECONDS = Fraction(1, 1000)  # the clock of Matroska
 _NUMBERED = re.compile(r"\d{5,}\.png")
@@ -33,6 +33,8 @@ def write_display_video(
     path: str | PathLike[str], display: PointLightDisplay, *, lossless: bool = False, **picture: Any
 ) -> None:
     """Writes a display as H.264 (MP4); `lossless` as FFV1 (Matroska), whose pixels are those of `frames`.
+
+    Sides of an MP4 are even: an odd one is one pixel longer than in `frames` (`even_size`).
 
     `picture`: arguments of `PointLightDisplay.frames`, such as `size_px` and `dot_px`.
     """
@@ -78,6 +80,12 @@ def remove_display(folder: str | PathLike[str]) -> None:
                 path.unlink()
         if not any(pictures.iterdir()):
             pictures.rmdir()
+
+
+def even_size(size_px: tuple[int, int]) -> tuple[int, int]:
+    """Width and height of an MP4 of pictures of this size: an odd side has one pixel more."""
+    width, height = (side + side % 2 for side in size_px)
+    return width, height
 
 
 def frames_left(

@@ -53,6 +53,7 @@ _OPTIONS = {
     "size_px": "--size",
     "centre_px": "--centre",
     "dot_px": "--dot-px",
+    "offsets_px": "--apart-m",
 }
 """The option for each argument that messages of `memo.pointlight` and of its displays name."""
 
@@ -61,6 +62,9 @@ _MOST_SEED = 2**63 - 1
 _SAME_TIME_S = 1e-3  # files round times to milliseconds
 
 _SAME_FRAMES = 1e-3
+
+_SAME_CYCLE = 1.03
+"""Cycles of actors who walk in step differ by less, longest over shortest."""
 
 _SEAM = 1.25
 """A step from end to start, as a multiple of the dot's largest step: at most 1.05 in recorded walks."""
@@ -134,7 +138,7 @@ def add_pointlight(app: "typer.Typer") -> None:
         ] = None,
         apart_m: Annotated[
             float | None,
-            typer.Option(help="Distance between actors side by side, metres; default: as recorded."),
+            typer.Option(help="Sideways distance between actors, metres; default: as recorded."),
         ] = None,
         cycles: Annotated[
             int | None, typer.Option(help="Number of whole cycles, which loop without a jump.", min=1)
@@ -288,6 +292,7 @@ def add_pointlight(app: "typer.Typer") -> None:
             "--seconds": seconds,
             "--px-per-m": px_per_m,
             "--dot-px": dot_px,
+            "--apart-m": apart_m,
             "--noise-area": noise_area,
             "--scramble-limit-px": scramble_limit_px,
         }
@@ -325,7 +330,7 @@ def add_pointlight(app: "typer.Typer") -> None:
                 actors = [walk]
                 if cycles is not None:
                     options["period_s"] = cycle_s
-            display, names = _display_of(actors, options, apart_m)
+            display, names = _display_of(actors, motion or [], options, apart_m)
             return _deliver(display, names, options, picture, (lossless, png), notes, delivery)
 
         raise typer.Exit(guarded(work))
@@ -340,7 +345,7 @@ def _deliver(
     notes: Sequence[str],
     delivery: Delivery,
 ) -> Exit:
-    from memo.display import frames_left, remove_display, write_display_png, write_display_video
+    from memo.display import even_size, frames_left, remove_display, write_display_png, write_display_video
     from memo.linkage import Points, write_points_csv
 
     out, (lossless, png) = delivery.out, also
@@ -361,6 +366,11 @@ def _deliver(
         write_display_png(out / "frames", display, **picture)
         written.append(out / "frames")
     lines = [*notes, f"{counted(shown.shape[1], 'dot')} in {counted(shown.shape[0], 'frame')}."]
+    if not lossless and any(side % 2 for side in picture["size_px"]):
+        even, asked = (
+            "x".join(map(str, size)) for size in (even_size(picture["size_px"]), picture["size_px"])
+        )
+        lines.append(f"display.mp4 is {even}, as its sides must be even numbers; --lossless keeps {asked}.")
     left, (width, height) = frames_left(display, picture["size_px"], picture["centre_px"])
     if left:
         lines.append(
@@ -443,23 +453,51 @@ def _numbers(option: str, text: str, separator: str, kind: type[int] | type[floa
 
 
 def _read_actors(paths: list[Path], markers: Path | None, fps: float | None) -> tuple[list[Any], list[str]]:
-    """The points of each file, cut to the length of the shortest."""
+    """The points of each file at the times that all have in common; of recordings that do not overlap in
+    time, from the first frame of each, as many frames as the shortest has."""
     read = [_read_points(path, markers, fps) for path in paths]
     actors, notes = (
         [points for points, _ in read],
         list(dict.fromkeys(note for _, own in read for note in own)),
     )
-    shortest = min(len(points.times_s) for points in actors)
-    if any(len(points.times_s) > shortest for points in actors):
-        notes.append(f"Cut to {counted(shortest, 'frame')}, the length of the shortest motion.")
     if len(actors) == 1:
         return actors, notes
-    clocks = [points.times_s[:shortest] - points.times_s[0] for points in actors]
+    firsts, clock_notes = _first_frames([points.times_s for points in actors])
+    notes += clock_notes
+    left = [len(points.times_s) - first for points, first in zip(actors, firsts, strict=True)]
+    if not any(firsts) and max(left) > min(left):
+        notes.append(f"Cut to {counted(min(left), 'frame')}, the length of the shortest motion.")
+    shown = [slice(first, first + min(left)) for first in firsts]
+    clocks = [
+        points.times_s[frames] - points.times_s[frames.start]
+        for points, frames in zip(actors, shown, strict=True)
+    ]
     for path, clock in zip(paths, clocks, strict=True):
         if not np.allclose(clock, clocks[0], atol=_SAME_TIME_S):
             raise InputError(f"{path}: has other times than {paths[0]}: give motions of one frame rate")
-    cut = [replace(one, times_s=clocks[0], positions=one.positions[:shortest]) for one in actors]
+    cut = [
+        replace(points, times_s=clocks[0], positions=points.positions[frames])
+        for points, frames in zip(actors, shown, strict=True)
+    ]
     return cut, notes
+
+
+def _first_frames(clocks: list[Any]) -> tuple[list[int], list[str]]:
+    """The frame of each actor with which a common display begins, and what the user should know of it."""
+    starts_s = [float(times_s[0]) for times_s in clocks]
+    if max(starts_s) - min(starts_s) < _SAME_TIME_S:
+        return [0] * len(clocks), []
+    start_s, end_s = max(starts_s), min(float(times_s[-1]) for times_s in clocks)
+    if start_s >= end_s:
+        return [0] * len(clocks), [
+            "The motions were recorded at different times: all begin with their first frames."
+        ]
+    firsts = [int(np.argmin(np.abs(times_s - start_s))) for times_s in clocks]
+    frames = min(len(times_s) - first for times_s, first in zip(clocks, firsts, strict=True))
+    return firsts, [
+        f"Cut to the {counted(frames, 'frame')} from {start_s:.4g} to {end_s:.4g} s, which all motions have"
+        " in common."
+    ]
 
 
 def _read_points(path: Path, markers: Path | None, fps: float | None) -> tuple[Any, Sequence[str]]:
@@ -494,43 +532,84 @@ def _read_points(path: Path, markers: Path | None, fps: float | None) -> tuple[A
 
 
 def _display_of(
-    actors: list[Any], options: dict[str, Any], apart_m: float | None
+    actors: list[Any], paths: Sequence[Path], options: dict[str, Any], apart_m: float | None
 ) -> tuple[memo._memo.PointLightDisplay, list[str]]:
     """One display of all actors, each with its own seed and its share of the noise dots, and the names of all
     points."""
     share, rest = divmod(options["noise_dots"], len(actors))
+    several = len(actors) > 1
+    if several and options["cycles"] is not None:
+        options = {**options, **_common_cycle(actors, paths, options)}
+    displays = []
+    for index, points in enumerate(actors):
+        own = {**options, "seed": options["seed"] + index, "noise_dots": share + (index < rest)}
+        try:
+            displays.append(memo.pointlight(_positions(points), points.times_s, points.names, **own))
+        except ValueError as error:
+            raise InputError(_of_file(str(error), paths[index] if several else None)) from None
+    if not several:
+        return displays[0], actors[0].names
+    names = [f"actor{index}_{name}" for index, points in enumerate(actors, 1) for name in points.names]
     try:
-        displays = [
-            memo.pointlight(
-                np.ascontiguousarray(points.positions, dtype=np.float64),
-                points.times_s,
-                points.names,
-                **{**options, "seed": options["seed"] + index, "noise_dots": share + (index < rest)},
+        return memo.pointlight_together(displays, _offsets_px(displays, options, apart_m)), names
+    except ValueError as error:
+        raise UsageError(_in_options(str(error))) from None
+
+
+def _common_cycle(actors: list[Any], paths: Sequence[Path], options: dict[str, Any]) -> dict[str, float]:
+    """The period and the start of one cycle of all actors, so that they stay in step with each other."""
+    asked_s = options["period_s"]
+    own_s = []
+    for points, path in zip(actors, paths, strict=True):
+        try:
+            cycle = memo.pointlight_cycle(
+                [_positions(points)], points.times_s, [points.names], period_s=asked_s
             )
-            for index, points in enumerate(actors)
-        ]
+        except ValueError as error:
+            raise InputError(_of_file(str(error), path)) from None
+        own_s.append(cycle[0])
+    interval_s = float(np.mean(np.diff(actors[0].times_s))) if len(actors[0].times_s) > 1 else 0.0
+    if max(own_s) > max(_SAME_CYCLE * min(own_s), min(own_s) + interval_s / 2):
+        tempo = options["tempo"] or 1.0
+        shown_s = [round(period_s / tempo / interval_s) * interval_s for period_s in own_s]
+        raise InputError(
+            f"the cycles of the motions take {', '.join(f'{period_s:.4g}' for period_s in shown_s)} s, so"
+            " they cannot loop together: leave --cycles out, or give each its own tempo in Python and join"
+            " the displays with memo.pointlight_together"
+        )
+    positions = [_positions(points) for points in actors]
+    names = [points.names for points in actors]
+    try:
+        period_s, start_s = memo.pointlight_cycle(positions, actors[0].times_s, names, period_s=asked_s)
     except ValueError as error:
         raise InputError(_in_options(str(error))) from None
-    if len(displays) == 1:
-        return displays[0], actors[0].names
-    if len({len(display.times_s) for display in displays}) > 1:
-        cycles_s = ", ".join(
-            f"{display.period_s:.4g}" for display in displays if display.period_s is not None
-        )
-        raise InputError(
-            f"the cycles of the motions take {cycles_s} s, so they cannot loop together: leave --cycles out,"
-            " or give each its own tempo in Python and join the displays with memo.pointlight_together"
-        )
-    offsets = None
+    return {"period_s": period_s, "cycle_start_s": start_s}
+
+
+def _offsets_px(
+    displays: list[memo._memo.PointLightDisplay], options: dict[str, Any], apart_m: float | None
+) -> Any:
+    """How far each display moves: sideways if actors are to stand apart, heights stay. `memo.pointlight`
+    flips each about its own middle; the scene of all is flipped about the middle of all."""
+    middles = np.array([display.centre_px for display in displays])
+    offsets = np.zeros_like(middles)
     if apart_m is not None:
-        middle = np.mean([display.centre_px for display in displays], axis=0)
         sides = (np.arange(len(displays)) - (len(displays) - 1) / 2) * apart_m * options["px_per_m"]
-        offsets = [
-            (middle[0] - display.centre_px[0] + side, middle[1] - display.centre_px[1])
-            for display, side in zip(displays, sides, strict=True)
-        ]
-    names = [f"actor{index}_{name}" for index, points in enumerate(actors, 1) for name in points.names]
-    return memo.pointlight_together(displays, offsets), names
+        offsets[:, 0] = middles[:, 0].mean() + sides - middles[:, 0]
+    placed = middles + offsets
+    is_flipped = np.array([options["mirrored"], options["inverted"]])
+    return offsets + np.where(is_flipped, 2 * (placed.mean(axis=0) - placed), 0.0)
+
+
+def _positions(points: Any) -> Any:
+    return np.ascontiguousarray(points.positions, dtype=np.float64)
+
+
+def _of_file(message: str, path: Path | None) -> str:
+    """A message with the command's options, and the file if it is about one of several."""
+    message = _in_options(message)
+    is_of_option = message.startswith("--") and " must be " in message
+    return message if path is None or is_of_option else f"{path}: {message}"
 
 
 def _in_options(message: str) -> str:
