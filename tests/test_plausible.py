@@ -67,6 +67,8 @@ def test_the_height_is_measured_in_a_calibrated_camera(scene):
             "person 0 is 1.65 m tall and person 1 is 1.80 m tall.",
         ),
         ((1.80, 1.65, 1.70), [(0, 1.80, "given")], "nobody was taken to be so tall: 1.65 m and 1.70 m."),
+        ((1.84, 1.84), [(0, 1.84, "given"), (1, 1.84, "given"), (0, 1.62, "measured")], ""),
+        ((1.80,), [(0, 1.62, "measured"), (0, 1.80, "given")], ""),
         ((1.80, 1.80), [(0, 1.80, "given"), (1, 1.80, "given"), (2, 1.74, "measured")], ""),
     ],
 )

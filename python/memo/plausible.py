@@ -64,8 +64,8 @@ def given_height_sentences(given_m: Sequence[float], walks: Iterable[tuple[int, 
 
     `walks`: persons with their walks.
     """
-    of_person = {person: walk.height for person, walk in walks}
-    taken_m = {person: height.height_m for person, height in of_person.items() if height.source == "given"}
+    taken = [(person, walk.height.height_m) for person, walk in walks if walk.height.source == "given"]
+    taken_m = dict(taken)
     said = []
     if any(list(given_m[person : person + 1]) != [height_m] for person, height_m in taken_m.items()):
         each = [f"person {person} is {height_m:.2f} m tall" for person, height_m in sorted(taken_m.items())]
@@ -74,7 +74,7 @@ def given_height_sentences(given_m: Sequence[float], walks: Iterable[tuple[int, 
             f"{enumerated(each)}."
         )
     left_m = list(given_m)
-    for height_m in taken_m.values():
+    for _, height_m in set(taken):  # walks of one person may differ
         if height_m in left_m:
             left_m.remove(height_m)
     if left_m:
