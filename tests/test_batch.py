@@ -19,7 +19,9 @@ import time
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from pathlib import Path
 
+import memo
 import pytest
+from conftest import grey_video
 from memo import batch
 from memo.batch import engine, tables
 from memo.batch.engine import Progress, described
@@ -502,7 +504,9 @@ def test_each_end_is_known_for_what_it_is(lab):
     assert sorted(path.name for path in lab.out.iterdir() if path.is_dir()) == [
         *(".batch", "logs", "v00", "v01", "v07")
     ]
-    assert result.counts == {"done": 2, "nobody": 1, "failed": 1, "crashed": 4, "timeout": 1}
+    assert result.counts == {
+        **{"done": 2, "nobody": 1, "elsewhere": 0, "failed": 1, "crashed": 4, "timeout": 1}
+    }
     assert result.unfinished == 6 and not lab.strays() and not lab.processes()
 
 
@@ -991,6 +995,22 @@ def test_memo_as_the_child(clip, tmp_path):
     subprocess.run([sys.executable, "-m", "memo.cli", "track", str(clip), "--out", str(alone), "--quiet"])
     for file in ("track.csv", "events.csv"):
         assert (alone / file).read_bytes() == (tmp_path / "out" / "clip" / file).read_bytes()
+
+
+def test_who_is_not_where_follow_says_has_no_row_of_somebody_else(tmp_path):
+    scene = memo.demo_scene(1)
+    video = grey_video(tmp_path / "clip.mkv", scene.frames)
+    given = {"video": video, "height_m": scene.height_m, "plots": False, "overlay": False}
+    result = batch.run([{**given, "follow": "3,3@40"}], tmp_path / "out")
+    (record,) = result.records
+    assert (record.state, record.walks, record.finished) == ("elsewhere", 0, True)
+    assert record.message.startswith("Nobody was tracked at 3,3@40, but person 0 at ")
+    assert not any("Somebody walks" in said or "3,3@40" in said for said in record.remarks)
+    (row,) = table(tmp_path / "out", "gait_parameters.csv")
+    assert (row["state"], row["walk"], row["direction"]) == ("elsewhere", "", "")
+    assert next(described(result)) == "1 video: 1 with nobody where follow says."
+    resumed = batch.run([{**given, "follow": "3,3@40"}], tmp_path / "out", resume=True)
+    assert resumed.done_now == 0 and resumed.counts["elsewhere"] == 1
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="memory is looked at on Linux")

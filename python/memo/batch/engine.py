@@ -495,6 +495,7 @@ def described(result: BatchResult) -> Iterator[str]:
     told = {
         "done": "tracked",
         "nobody": "without a walker",
+        "elsewhere": "with nobody where follow says",
         "failed": "failed",
         "crashed": "crashed",
         "timeout": "took too long",

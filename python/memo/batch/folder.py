@@ -33,8 +33,9 @@ from memo.unfinished import complete_file, new_folder
 
 __all__ = ["STATES", "BatchError", "OutFolder", "Record", "check_ours"]
 
-STATES = ("done", "nobody", "failed", "crashed", "timeout")
-"""A walker was tracked; there is none in the video; the input cannot be used; the process died; timeout."""
+STATES = ("done", "nobody", "elsewhere", "failed", "crashed", "timeout")
+"""A walker was tracked; there is none in the video; none is where `follow` says; the input cannot be used;
+the process died; timeout."""
 
 
 class BatchError(ValueError):
@@ -58,14 +59,14 @@ class Record:
     fingerprint: dict[str, Any]
     """What the result depends on, see `Row.fingerprint`."""
     walks: int | None = None
-    """Number of walks tracked; `None` if unknown."""
+    """Number of walks tracked, 0 if nobody is where `follow` says; `None` if unknown."""
     remarks: tuple[str, ...] | list[str] = ()
     """Other remarks on the results: doubts, damage of the video, differences of the sides."""
 
     @property
     def finished(self) -> bool:
-        """Whether there are results: a walker, or the finding that there is none."""
-        return self.state in ("done", "nobody")
+        """Whether there are results: a walker, or the finding that there is none, at all or at a place."""
+        return self.state in ("done", "nobody", "elsewhere")
 
 
 @dataclass(frozen=True)

@@ -75,7 +75,8 @@ def _track(arguments: Sequence[str]) -> Exit:
             raise
         _complain(" ".join(str(error).split()))
         return Exit.BAD_INPUT
-    print(json.dumps(plain({**recorded.document, "files": [str(path) for path in recorded.written]})))
+    files = [str(path) for path in recorded.written]
+    print(json.dumps(plain({**recorded.document, "not_there": recorded.not_there, "files": files})))
     return recorded.exit
 
 

@@ -54,7 +54,7 @@ def write_table(folder: OutFolder, rows: Sequence[Row], path: Path) -> dict[str,
         walks = [common]
         if record is not None and record.finished:
             try:
-                walks = _walks(folder.results(row.name), common)
+                walks = _walks(folder.results(row.name), common, asked=record.state != "elsewhere")
             except OSError as error:
                 unreadable[row.name] = f"{error.filename or folder.results(row.name)}: {error.strerror}"
             except ValueError as error:
@@ -66,10 +66,12 @@ def write_table(folder: OutFolder, rows: Sequence[Row], path: Path) -> dict[str,
     return unreadable
 
 
-def _walks(results: Path, common: dict[str, Any]) -> list[dict[str, Any]]:
-    """One dict per walk of the video, by column; one without a walk if it has none."""
+def _walks(results: Path, common: dict[str, Any], *, asked: bool) -> list[dict[str, Any]]:
+    """One dict per walk of the video, by column; one without a walk if it has none that was asked for."""
     given, seen = _run(results / "run.json")
     common = {**common, **given}
+    if not asked:
+        return [common]
     walks: dict[str, dict[str, Any]] = {}
     lines = read_text_columns(results / "gait_parameters.csv", GAIT_COLUMNS, {"person": "walk"})
     for walk, person, parameter, side, value, unit, low, high, n in zip(*lines.values(), strict=True):

@@ -94,9 +94,11 @@ def _tracked(task: Task, results: Path) -> Record | None:
         state, message = "crashed", "it ended without an error and without track.csv"
     elif state in ("done", "nobody"):
         walks, message, remarks = _told(said_text, complaint_text)
+        if state == "nobody" and walks:  # tracked, but at another place
+            state, walks = "elsewhere", 0
     if not task.folder.is_current(task.run):
         return None
-    if state in ("done", "nobody"):
+    if state in ("done", "nobody", "elsewhere"):
         task.folder.place(results, task.name)
     record = Record(
         name=task.name,
@@ -195,13 +197,17 @@ def _verdict(task: Task, code: int | str, complaints: str) -> tuple[str, str]:
 def _told(said: str, complaints: str) -> tuple[int | None, str, list[str]]:
     """The number of walks, the message about each, and other remarks.
 
-    `said` is the JSON of the child; its `sentences` hold the message of each walk and the other remarks.
+    `said` is the JSON of the child; its `sentences` hold the message of each walk and the other remarks. If
+    nobody was tracked at the place of `follow`, the message says so and the other sentences are of no use.
     """
     complained = [
         line.removeprefix("memo: ") for line in complaints.splitlines() if line.startswith("memo: ")
     ]
     try:
         summary = json.loads(said)
+        if (not_there := summary.get("not_there")) and summary["walks"]:
+            remarks = [line for line in complained if not line.endswith(not_there)]
+            return int(summary["walks"]), not_there[0].upper() + not_there[1:] + ".", remarks
         messages = [walk["message"] for walk in summary["each_walk"]] or [summary["message"]]
         others = [line for line in summary["sentences"] if not line.endswith(tuple(messages))]
         several = len(messages) > 1

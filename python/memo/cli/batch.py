@@ -41,9 +41,9 @@ EPILOG = """Examples:
   memo batch trials.csv --out trials --resume
   memo batch trials.csv --out trials --shard 2/4
 
-Exit codes: 0 every video was tracked or shows nobody; 1 the manifest or the folder cannot \
-be used; 2 wrong usage; 4 the app extra is not installed; 5 some videos failed or are left, see status.csv; \
-130 interrupted."""
+Exit codes: 0 every video was tracked or shows nobody, or nobody where follow says; 1 the manifest or \
+the folder cannot be used; 2 wrong usage; 4 the app extra is not installed; 5 some videos failed or are \
+left, see status.csv; 130 interrupted."""
 
 _FEW = 5  # videos named in a message if there are many
 _LONGEST_LINE = 300  # characters of a printed message; status.csv has the whole message
