@@ -142,8 +142,19 @@ def test_only_the_longest_are_told():
     said = left_out_sentences(left_out, 120)
     assert said[0] == "120 moving people or things were not followed. The 3 seen longest:"
     assert len(said) == 4 and "over the ground" in said[1] and "eight larger" in said[2]
+    assert "Leave --treadmill" not in said[1]  # somebody else may walk on the treadmill
     assert all(left.sentence.endswith(".") for left in left_out)
     assert left_out_sentences([], 0) == []
+
+
+def test_a_speed_is_called_that_across_the_picture():
+    def said(reason, value):
+        return LeftOut(0, 79, 0.0, 3.2, 80, np.ones((1, 5), int), reason, value).sentence
+
+    assert said("too slow", 0.06).startswith("it hardly moved across the picture (0.06 m/s); ")
+    assert "only while nobody else walks in the picture" in said("too slow", 0.06)
+    assert said("too fast", 3.4) == "it moved across the picture at 3.4 m/s, faster than people walk."
+    assert "41.8" not in said("too fast", 41.8) and "the camera moved" in said("too fast", 41.8)
 
 
 @pytest.mark.parametrize("scene_name", ["three", "pair", "cross2", "toward"])

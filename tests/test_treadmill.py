@@ -6,6 +6,8 @@ import memo
 import numpy as np
 import pytest
 from memo import _memo
+from memo.left_out import LeftOut, stays_in_place
+from memo.tracking import Track
 from memo.treadmill import treadmill_figures, treadmill_sentence
 
 
@@ -68,3 +70,35 @@ def test_a_treadmill_can_be_excluded(scene):
         scene.frames, times_s=scene.times_s, camera=scene.camera, height_m=scene.height_m, treadmill=False
     )
     assert not any(walk.treadmill for walk in track.walks)
+
+
+def test_an_option_that_hides_the_walk_is_named(scene):
+    given = {"times_s": scene.times_s, "camera": scene.camera, "height_m": scene.height_m}
+    track = memo.track(scene.frames, **given, treadmill=False)
+    assert track.walks == []
+    assert "leave --no-treadmill (treadmill=False) out" in track.sentences[-1]
+    assert not any("treadmill" in said for said in memo.track(scene.frames, **given).sentences[2:])
+
+
+@pytest.mark.parametrize(
+    ("reason", "frames", "left_px", "heights_px", "stays"),
+    [
+        ("not walking", 80, 0, (200, 198), True),
+        ("too slow", 80, 40, (200, 190), True),
+        ("too slow", 39, 0, (200, 198), False),
+        ("cut off", 80, 0, (200, 198), False),
+        ("not walking", 80, 180, (200, 198), False),  # goes on
+        ("too slow", 80, 10, (190, 300), False),  # comes nearer
+    ],
+)
+def test_who_stays_in_place_may_be_on_a_treadmill(reason, frames, left_px, heights_px, stays):
+    boxes = [(0, 100, 50, 60, heights_px[0]), (60, 100 + left_px, 50, 60, heights_px[1])]
+    boxes.append((79, 120, 50, 20, 30))  # a part alone
+    left = LeftOut(0, 79, 0.0, 3.2, frames, np.array(boxes), reason, None)
+    assert stays_in_place(left) == stays
+
+
+def test_with_the_option_other_walks_are_not_tracked():
+    seek = _memo.SeekReport(90, 79, 0, 17, 13, 0, 0, 0.0)
+    asked, free = (Track([], seek, options={"treadmill": option}).summary for option in (True, None))
+    assert "only walks on a treadmill" in asked["message"] and "treadmill" not in free["message"]

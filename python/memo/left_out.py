@@ -14,9 +14,15 @@ from memo.wording import counted
 if TYPE_CHECKING:
     from memo import _memo
 
-__all__ = ["LeftOut", "left_out_sentences", "over_ground"]
+__all__ = ["LeftOut", "left_out_sentences", "over_ground", "stays_in_place", "too_far_apart"]
 
 _MOST_SENTENCES = 3
+_NOBODY_MPS = 12.0
+"""Nobody runs faster than this: a thing, or a camera that moved, is."""
+_WHOLE = 0.8
+"""Boxes at least this high, as a share of the median height, show all of somebody."""
+_LEAST_ON_THE_SPOT = 40
+"""A walk on a treadmill starts after so many frames (`TrackerOptions::path_frames` of the core)."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +46,8 @@ class LeftOut:
     """"cut off", "too small", "wrong size", "too wide", "too slow", "too fast", "not walking", "too brief",
     "beside somebody", "too many", "frames too far apart" or "over ground"."""
     value: float | None
-    """The figure of the reason: height in pixels, speed in m/s, seconds, or a number of frames."""
+    """The figure of the reason: height in pixels, speed in m/s (across the picture, or over the ground for
+    "over ground"), seconds, or a number of frames."""
 
     @property
     def sentence(self) -> str:
@@ -115,13 +122,25 @@ def over_ground(left_out: Sequence[LeftOut]) -> str | None:
     moved = [left for left in left_out if left.reason == "over ground"]
     if not moved:
         return None
-    return f"Nobody walks on a treadmill: somebody {_moved(max(moved, key=_metres))}"
+    somebody = _moved(max(moved, key=_metres))
+    return f"Nobody walks on a treadmill: somebody {somebody}. Leave --treadmill (treadmill=True) out."
 
 
 def too_far_apart(left_out: Sequence[LeftOut]) -> str | None:
     """That steps cannot be followed in frames so far apart; None if nobody was left out for this."""
     apart = [left for left in left_out if left.reason == "frames too far apart"]
     return f"Nobody was seen walking: {_apart(apart[0])}" if apart else None
+
+
+def stays_in_place(left: LeftOut) -> bool:
+    """Whether it was refused as a walk over the ground, but may be one on a treadmill by its boxes: they are
+    there for long enough, at one place and equally high."""
+    if left.reason not in ("not walking", "too slow") or left.frames < _LEAST_ON_THE_SPOT:
+        return False
+    heights = left.boxes[:, 4]
+    whole = left.boxes[heights >= _WHOLE * np.median(heights)]
+    middles, heights = whole[:, 1] + whole[:, 3] / 2, whole[:, 4]
+    return bool(2 * np.ptp(middles) < np.median(heights) and _WHOLE * heights.max() < heights.min())
 
 
 def _apart(left: LeftOut) -> str:
@@ -136,10 +155,13 @@ def _metres(left: LeftOut) -> float:
 
 
 def _moved(left: LeftOut) -> str:
-    return (
-        f"moves over the ground by {_metres(left):.1f} m, at {left.value or 0.0:.2f} m/s. Leave --treadmill "
-        "(treadmill=True) out."
-    )
+    return f"moves over the ground by {_metres(left):.1f} m, at {left.value or 0.0:.2f} m/s"
+
+
+def _fast(left: LeftOut) -> str:
+    if left.value is not None and left.value > _NOBODY_MPS:
+        return "it moved across the picture faster than anybody runs: it is a thing, or the camera moved."
+    return f"it moved across the picture at {left.value or 0:.1f} m/s, faster than people walk."
 
 
 _SENTENCES: dict[str, Callable[[LeftOut], str]] = {
@@ -147,8 +169,11 @@ _SENTENCES: dict[str, Callable[[LeftOut], str]] = {
     "too small": lambda left: f"only {left.value or 0:.0f} px high, too small to see limbs.",
     "wrong size": lambda left: "too small or too large for a person who stands on the ground there.",
     "too wide": lambda left: "wider than one person: several people who move as one region, or a thing.",
-    "too slow": lambda left: f"it stayed in place or was too slow for a walk ({left.value or 0:.2f} m/s).",
-    "too fast": lambda left: f"it moved at {left.value or 0:.1f} m/s, faster than people walk.",
+    "too slow": lambda left: (
+        f"it hardly moved across the picture ({left.value or 0:.2f} m/s); somebody on a treadmill, or who "
+        "comes nearer or goes away, is found only while nobody else walks in the picture."
+    ),
+    "too fast": _fast,
     "not walking": lambda left: "its contours do not fit a person who walks.",
     "too brief": lambda left: (
         f"wholly visible and apart from others in at most {counted(left.value or 0, 'frame')} in a row, too "
@@ -157,5 +182,5 @@ _SENTENCES: dict[str, Callable[[LeftOut], str]] = {
     "beside somebody": lambda left: "it was not told apart from somebody who was followed there.",
     "too many": lambda left: "eight larger regions moved at the same time; no more are looked at.",
     "frames too far apart": _apart,
-    "over ground": lambda left: f"somebody {_moved(left)}",
+    "over ground": lambda left: f"somebody {_moved(left)}, and not on a treadmill.",
 }

@@ -17,7 +17,7 @@ from memo.camera_motion import CameraMotion
 from memo.cycles import cycle_table, departure_sentences
 from memo.files import EVENT_COLUMNS, TRACK_COLUMNS
 from memo.gait import cadence_sentences, gait_table, lookup, symmetry_sentences
-from memo.left_out import LeftOut, left_out_sentences, over_ground, too_far_apart
+from memo.left_out import LeftOut, left_out_sentences, over_ground, stays_in_place, too_far_apart
 from memo.notebook import table
 from memo.pixels import camera_of_video, columns_of_video, of_video
 from memo.plausible import (
@@ -443,6 +443,8 @@ class Track:
         """The findings in sentences, one walk after another."""
         said = self.camera_motion.sentences + self._flicker_sentences() + self._height_sentences()
         left_out = left_out_sentences(self.left_out, self.seek_report.left_out)
+        if self._options.get("treadmill") is False and any(map(stays_in_place, self.left_out)):
+            left_out.append(_PERHAPS_ON_A_TREADMILL)
         if not self.walks:
             return [self.summary["message"], *said, *left_out]
         for index, walk in enumerate(self.walks):
@@ -681,6 +683,8 @@ class Track:
                 f"Nobody was seen walking: something moves in only {counted(moving, 'frame')}, and a walk is "
                 f"found in {needed}."
             )
+        if why == "not walking" and self._options.get("treadmill"):
+            return f"{_NOBODY[why]} {_ONLY_ON_A_TREADMILL}"
         if why == "not walking" and self._camera is None:
             return _NOT_WALKING_WITHOUT_CAMERA
         return _NOBODY[why]
@@ -719,6 +723,11 @@ _NOBODY = {
     "not walking": "Something moves, but not like a walking person of this height seen by this camera.",
     "never fully visible": "Somebody moves, but is never fully visible for long enough to start.",
 }
+_PERHAPS_ON_A_TREADMILL = (
+    "Something moves in one place for as long as a walk on a treadmill needs to start: if somebody walks "
+    "there, leave --no-treadmill (treadmill=False) out."
+)
+_ONLY_ON_A_TREADMILL = "With --treadmill (treadmill=True), only walks on a treadmill are tracked."
 _NOT_WALKING_WITHOUT_CAMERA = (
     "Something moves, but not like a person of this height who walks across the picture. Somebody who walks "
     "towards the camera or away from it is tracked only with a calibrated camera."
