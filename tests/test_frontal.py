@@ -88,6 +88,7 @@ def test_the_summary_says_what_was_measured_and_what_not(track):
     summary = track.summary
     assert "walks towards the camera" in summary["message"] and "not certain" not in summary["message"]
     assert summary["direction"] == "towards the camera" and summary["p_swapped"] == 0.5
+    assert "towards the camera (whether forwards or backwards is not seen) for" in summary["message"]
     assert not summary["fit"]["measured"] and "from the front" in summary["fit"]["problem"]
 
 

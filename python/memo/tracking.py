@@ -632,8 +632,10 @@ class Track:
             return treadmill_sentence(walk, times_s[-1] - times_s[0], cadence)
         manner = "walks" if walk.direction == "forward" else "walks backwards"
         sure = walk.p_other_direction < 0.1
+        # The feet show where the person goes, and not which way the person faces.
+        way = cls._way(walk) + " (whether forwards or backwards is not seen)" * walk.is_frontal
         return (
-            f"Somebody {manner} {cls._way(walk)}{turning_words(walk)} for {times_s[-1] - times_s[0]:.1f} s"
+            f"Somebody {manner} {way}{turning_words(walk)} for {times_s[-1] - times_s[0]:.1f} s"
             f" at {speed:.2f} m/s"
             + (f", {cadence:.0f} steps per minute" if np.isfinite(cadence) else "")
             + ("." if sure else f"; the direction is not certain (p = {1 - walk.p_other_direction:.2f}).")
