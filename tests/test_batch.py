@@ -529,6 +529,7 @@ def test_each_walk_of_a_video_has_its_own_direction(lab):
         [row[name] for name in ("walk", "person", "direction", "gait", "p_swapped", "fits")]
         for row in table(lab.out, "gait_parameters.csv")
     ]
+    assert table(lab.out, "gait_parameters.csv")[0]["camera_motion"] == ""  # of an older version
     assert seen == [
         ["0", "0", "left to right", "forward", "0.010000", "in part"],
         ["1", "1", "right to left", "backward", "0.200000", "not measured"],
@@ -1007,6 +1008,7 @@ def test_who_is_not_where_follow_says_has_no_row_of_somebody_else(tmp_path):
     assert record.message.startswith("Nobody was tracked at 3,3@40, but person 0 at ")
     assert not any("Somebody walks" in said or "3,3@40" in said for said in record.remarks)
     (row,) = table(tmp_path / "out", "gait_parameters.csv")
+    assert row["camera_motion"] == "still"
     assert (row["state"], row["walk"], row["direction"]) == ("elsewhere", "", "")
     assert next(described(result)) == "1 video: 1 with nobody where follow says."
     resumed = batch.run([{**given, "follow": "3,3@40"}], tmp_path / "out", resume=True)

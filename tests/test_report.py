@@ -565,6 +565,29 @@ def test_many_walks_leave_the_picture_in_sight(run_folder):
     assert "swapped in walks 5 and 6 (probability up to 45%)." in head
 
 
+@pytest.mark.parametrize(
+    ("counts", "lost", "tone"),
+    [
+        ((20, 0, 0, 0), [], "good"),
+        ((1, 19, 0, 0), [], "good"),
+        ((2, 10, 8, 0), [], "fair"),
+        ((20, 0, 0, 0), [[7, "cut"]], "fair"),
+    ],
+)
+def test_the_status_knows_of_a_camera_that_moved_too_far(run_folder, counts, lost, tone):
+    names = [f"frames_{state}" for state in ("still", "turned", "unknown", "lost")]
+    motion = {"moved": True, **dict(zip(names, counts, strict=True)), "lost": lost}
+    folder = run_folder(summary={"status": "tracked", "message": "Goes.", "camera_motion": motion})
+    track = read_track_csv(folder / "track.csv")
+    write_track_csv(folder / "track.csv", track | {"p_swapped": 0 * track["p_swapped"]})
+    assert f'<span class="status {tone}">tracked</span>' in page_of(folder)[0]
+
+
+def test_one_folded_sentence_is_one(run_folder):
+    folder = run_folder(sentences=[f"Walk {k}: Somebody walks." for k in range(9)])
+    assert "<summary>1 more sentence</summary>" in page_of(folder)[0]
+
+
 def test_an_interrupted_run_says_so(run_folder):
     written, _, _ = page_of(run_folder(interrupted=True, frames_read=12))
     assert '<span class="status fair">tracked, interrupted</span>' in written

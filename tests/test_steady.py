@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from conftest import SHARED_DATA
 from memo import _memo
-from memo.camera_motion import CameraMotion
+from memo.camera_motion import CameraMotion, outcome
 
 SIZE = (320, 240)
 
@@ -97,6 +97,27 @@ def test_frames_that_no_turn_explains_are_reported(states, is_reported):
     assert motion.is_unexplained == is_reported and len(said) == is_reported
     turned = states.count("turned")
     assert turned != 1 or "Of 20 frames, 1 was turned back." in motion.sentences[0]
+    limited = "in the frames that could be steadied, the picture shifts by up to 1.0 px"
+    assert not turned or (limited in motion.sentences[0]) == is_reported
+
+
+@pytest.mark.parametrize(
+    ("states", "lost", "expected"),
+    [
+        ([], [], ""),  # not looked for
+        (["unknown"] * 20, [], "still"),
+        (["still"] * 20, [], "still"),
+        (["still", "turned"] * 10, [], "steadied"),
+        (["turned"] * 10 + ["unknown"] * 10, [], "beyond"),
+        (["still"] * 20, [SimpleNamespace(frame=3, reason="cut")], "beyond"),
+    ],
+)
+def test_the_outcome_of_a_camera_s_motion(states, lost, expected):
+    rows = [
+        SimpleNamespace(frame=k, state=state, turn_rad=(0, 0, 0), shift_px=1.0, rms_px=0.5, support=0.5)
+        for k, state in enumerate(states)
+    ]
+    assert outcome(CameraMotion(rows, lost).summary) == expected
 
 
 def test_a_hand_held_recording_is_steadied():

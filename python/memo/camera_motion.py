@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from typing import TYPE_CHECKING, Any
@@ -16,7 +16,7 @@ from memo.wording import counted
 if TYPE_CHECKING:
     from memo._memo import FrameMotion, LostView
 
-__all__ = ["CAMERA_MOTION_COLUMNS", "CameraMotion", "write_camera_motion_csv"]
+__all__ = ["CAMERA_MOTION_COLUMNS", "CameraMotion", "outcome", "write_camera_motion_csv"]
 
 CAMERA_MOTION_COLUMNS = (
     *("frame", "state", "rx_rad", "ry_rad", "rz_rad", "shift_px", "shift_rms_px", "support"),
@@ -67,15 +67,13 @@ class CameraMotion:
     @property
     def is_unexplained(self) -> bool:
         """True if there is texture, but no turn of the camera explains a good part of the frames."""
-        states = [row.state for row in self.rows]
-        known = states.count("still") + states.count("turned")
-        return known > 0 and states.count("unknown") > _UNEXPLAINED * len(states)
+        return _is_unexplained(_counts([row.state for row in self.rows]))
 
     @property
     def summary(self) -> dict[str, Any]:
         """Number of frames per state, displacement of the steadied frames (pixels), and lost views."""
         columns = self.columns
-        counts = {f"frames_{state}": int((columns["state"] == state).sum()) for state in _STATES}
+        counts = _counts(columns["state"].tolist())
         turned = columns["state"] == "turned"
         largest, rms = columns["shift_px"][turned], columns["shift_rms_px"][turned]
         return {
@@ -91,22 +89,45 @@ class CameraMotion:
         """What to know of a camera that moved; none of one that stood still."""
         summary, said = self.summary, []
         if steadied := summary["frames_turned"]:
+            where = "in the frames that could be steadied, " * (outcome(summary) == "beyond")
             said.append(
-                f"The camera moved: the picture shifts by up to {summary['largest_px']:.1f} px "
+                f"The camera moved: {where}the picture shifts by up to {summary['largest_px']:.1f} px "
                 f"({summary['rms_px']:.1f} px root mean square) against the first frame. "
                 f"Of {counted(len(self.rows), 'frame')}, {counted(steadied, 'was', 'were')} turned back."
             )
         if self.is_unexplained:
             said.append(
                 f"In {counted(summary['frames_unknown'], 'frame')} of {len(self.rows)} the camera did more "
-                "than turn, or turned too far: perhaps it zoomed or was carried along, or the background has "
-                "too little texture. Places, directions and speeds are wrong where it moved."
+                "than turn, or turned too far, by an unknown amount: perhaps it zoomed or was carried along, "
+                "or the background has too little texture. Places, directions and speeds are wrong where it "
+                "moved."
             )
         for frame, reason in summary["lost"][:5]:
             said.append(f"{_WHAT[reason].format(frame=frame)} {_THEN[self.camera_given]}")
         if len(summary["lost"]) > 5:
             said.append(f"{counted(len(summary['lost']) - 5, 'more view')} ended like this.")
         return said
+
+
+def outcome(summary: Mapping[str, Any]) -> str:
+    """What `CameraMotion.summary` means for the results: the camera stood "still", its frames were
+    "steadied", or it moved "beyond" what can be steadied or a view was lost; empty if it was not looked for.
+    """
+    if summary["lost"] or _is_unexplained(summary):
+        return "beyond"
+    if summary["frames_turned"]:
+        return "steadied"
+    return "still" if any(summary[f"frames_{state}"] for state in _STATES) else ""
+
+
+def _counts(states: Sequence[str]) -> dict[str, int]:
+    return {f"frames_{state}": states.count(state) for state in _STATES}
+
+
+def _is_unexplained(counts: Mapping[str, Any]) -> bool:
+    known = counts["frames_still"] + counts["frames_turned"]
+    total = sum(counts[f"frames_{state}"] for state in _STATES)
+    return bool(known > 0 and counts["frames_unknown"] > _UNEXPLAINED * total)
 
 
 _WHAT = {

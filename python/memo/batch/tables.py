@@ -10,6 +10,7 @@ from typing import Any
 
 from memo.batch.folder import BatchError, OutFolder
 from memo.batch.manifest import Row
+from memo.camera_motion import outcome
 from memo.files import read_text_columns
 from memo.gait import GAIT_COLUMNS
 from memo.spreadsheet import write_rows
@@ -21,7 +22,7 @@ STATUS_COLUMNS = ("name", "state", "walks", "attempt", "seconds", "message", "re
 
 _UNITS = {"1/min": "_per_min", "m": "_m", "s": "_s", "m/s": "_mps", "%": "_percent", "deg": "_deg", "": ""}
 _LEADING = (
-    *("name", "state", "walk", "person", "height_m", "camera_given", "left_out"),
+    *("name", "state", "walk", "person", "height_m", "camera_given", "camera_motion", "left_out"),
     *("start_s", "end_s", "direction", "gait", "p_swapped", "fits"),
 )
 
@@ -87,10 +88,12 @@ def _run(path: Path) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
         run = json.loads(path.read_text(encoding="utf-8"))
         height_m = run["options"]["height_m"]
         several = isinstance(height_m, list)
+        summary = run.get("summary") or {}
         given = {
             "height_m": ",".join(map(str, height_m)) if several else height_m,
             "camera_given": "yes" if run["camera_given"] else "no",
-            "left_out": (run.get("summary") or {}).get("left_out", ""),
+            "camera_motion": outcome(summary["camera_motion"]) if "camera_motion" in summary else "",
+            "left_out": summary.get("left_out", ""),
         }
         seen = {
             str(number): {

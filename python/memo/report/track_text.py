@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 import memo
+from memo.camera_motion import outcome
 from memo.gait import DEFINITIONS, GAIT_COLUMNS, cadence_sentences, digits_of
 from memo.plausible import LIKELY_MISTAKEN
 from memo.report import normative
@@ -34,7 +35,7 @@ def track_text(run: RunFolder, notes: list[str], pictures: list[Picture]) -> dic
         "status": text(status),
         "tone": tone,
         "sentences": _folded(
-            [f"<p>{text(said)}</p>" for said in _sentences(run)], _MOST_SENTENCES, "sentences"
+            [f"<p>{text(said)}</p>" for said in _sentences(run)], _MOST_SENTENCES, "sentence"
         ),
         "warnings": _warnings(run, notes),
         "parameters": _parameters(run),
@@ -61,7 +62,9 @@ def _status(run: RunFolder) -> tuple[str, str]:
         return told, "bad"
     doubtful = any(p_swapped > LIKELY_MISTAKEN for _, p_swapped in _swapped(run)) or _unsteady(run)
     walks = dict.fromkeys(run.columns["walk"].tolist())
-    doubtful = doubtful or any(run.verdict(walk) not in (None, "well") for walk in walks)
+    doubtful = (
+        doubtful or _moved_too_far(run) or any(run.verdict(walk) not in (None, "well") for walk in walks)
+    )
     return told, "fair" if doubtful or told != "tracked" else "good"
 
 
@@ -70,7 +73,8 @@ def _folded(items: list[str], most: int, what: str) -> str:
     shown, folded = items[:most], items[most:]
     if not folded:
         return "".join(shown)
-    more = f"<details><summary>{len(folded)} more {what}</summary>{''.join(folded)}</details>"
+    number_of = counted(len(folded), f"more {what}")
+    more = f"<details><summary>{number_of}</summary>{''.join(folded)}</details>"
     return "".join(shown) + more
 
 
@@ -81,6 +85,12 @@ def _unsteady(run: RunFolder) -> bool:
         return False
     cadences = (table["parameter"] == "cadence") & (table["side"] == "")
     return any(cadence_sentences(table, walk) for walk in dict.fromkeys(table["walk"][cadences].tolist()))
+
+
+def _moved_too_far(run: RunFolder) -> bool:
+    """Whether the camera moved beyond what can be steadied, or a view was lost."""
+    motion = (run.run.get("summary") or {}).get("camera_motion")
+    return motion is not None and outcome(motion) == "beyond"
 
 
 def _sentences(run: RunFolder) -> list[str]:
@@ -231,7 +241,7 @@ def _parameters(run: RunFolder) -> str:
     tables = ""
     for person in dict.fromkeys(line["person"] for line in lines):
         own = [_of_walk(run, walk, of) for walk, of in of_walk.items() if of[0]["person"] == person]
-        tables += _of_person(person, _folded(own, _MOST_TABLES, "walks"))
+        tables += _of_person(person, _folded(own, _MOST_TABLES, "walk"))
     named = dict.fromkeys(line["parameter"] for line in lines)
     meanings = {name.replace("_", " "): DEFINITIONS[name] for name in named if name in DEFINITIONS}
     told = f"<details open><summary>Definitions</summary>{_listed(meanings)}</details>"
@@ -264,7 +274,7 @@ def _fits(run: RunFolder) -> str:
     tables = ""
     for person, walks in run.people.items():
         own = [_fit_of_walk(run, walk) for walk in walks]
-        tables += _of_person(person, _folded(own, _MOST_TABLES, "walks"))
+        tables += _of_person(person, _folded(own, _MOST_TABLES, "walk"))
     return tables
 
 
