@@ -5,7 +5,7 @@ import shlex
 
 import pytest
 from memo import batch
-from memo.given import InputError, is_url, nothing_at, tracker_options
+from memo.given import Box, InputError, Point, is_url, nothing_at, place_in_frame, tracker_options
 
 
 @pytest.fixture
@@ -60,6 +60,29 @@ def test_a_url_in_a_manifest_is_told_with_its_line(command, tmp_path):
     first, second = said.splitlines()
     assert first.startswith("memo: m.csv, line 2: https://example.org/a.mp4: is a URL: download it first")
     assert second.startswith("memo: m.csv, line 3: https://example.org/c.toml: is a URL")
+
+
+@pytest.mark.parametrize(
+    ("text", "place"),
+    [
+        ("320,240@50", Point(320, 240, 50)),
+        (" 3.5,4@0 ", Point(3.5, 4, 0)),
+        ("280,120,80.5,240@50", Box(280, 120, 80.5, 240, 50)),
+    ],
+)
+def test_somebody_is_chosen_by_a_point_or_a_box(text, place):
+    found = place_in_frame(text)
+    assert found == place and type(found) is type(place) and str(found) == text.strip()
+
+
+@pytest.mark.parametrize(
+    "text", ["3,4", "1,2,3@4", "1,2,3,4", "1,2,0,4@5", "1,2,3,-4@5", "1,2,3,4,5@6", "a,b@c"]
+)
+def test_what_is_neither_a_point_nor_a_box_is_refused(text):
+    with pytest.raises(
+        InputError, match=rf"--follow {text} is neither a point in a frame, X,Y@F .* nor a box"
+    ):
+        place_in_frame(text)
 
 
 @pytest.mark.parametrize(

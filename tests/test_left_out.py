@@ -188,6 +188,11 @@ def test_a_point_where_nobody_is_finds_nobody(memo_command, tmp_path):
     assert abs(u_px - mean_u_px(scene)[frame]) < 25
     code, complained = followed(f"{place}@{frame}")
     assert code == Exit.TRACKED and "nobody" not in complained
+    around = f"{u_px - 40},100,80,300@{frame}"
+    code, complained = followed(around)
+    assert code == Exit.TRACKED and "nobody" not in complained
+    code, complained = followed(f"0,0,9,9@{frame}")
+    assert code == Exit.NOBODY and f"nobody was tracked at 0,0,9,9@{frame}, but person 0 at " in complained
     code, complained = followed(f"{place}@{last}")
     assert code == Exit.NOBODY and "nor anywhere in this frame, but person 0 (frames " in complained
     code, complained = followed(f"{place}@100000")

@@ -9,6 +9,7 @@ import re
 import signal
 import subprocess
 import sys
+import types
 
 import matplotlib
 import memo
@@ -311,6 +312,22 @@ def test_a_point_of_the_picture_chooses_a_person(track):
     assert len(alone) == len(track) and alone.summary == track.summary
     with pytest.raises(ValueError, match=r"no person 1; people of the track: 0"):
         track.of_person(1)
+
+
+def test_a_box_in_the_picture_chooses_a_person(track):
+    frame = int(track.columns["frame"][len(track) // 2])
+    ((_, (low, high)),) = track.extents(frame)
+    width, height = high - low
+    assert track.person_in(*low, width, height, frame) == 0
+    assert track.person_in(*(low + 0.4 * (high - low)), width / 5, height / 5, frame) == 0  # of a part
+    assert track.person_in(low[0] + 0.8 * width, low[1], width, height, frame) is None
+    assert track.person_in(*low, width, height, 10_000) is None
+    beside = np.array([0.3 * width, 0])
+    boxes = [(0, np.stack([low, high])), (1, np.stack([low + beside, high + beside]))]
+    two = types.SimpleNamespace(columns={"person": np.array([0, 1])}, extents=lambda frame: boxes)
+    for at, person in ((0.1, 0), (0.2, 1)):
+        left = low[0] + at * width
+        assert memo.Track.person_in(two, left, low[1], width, height, frame) == person
 
 
 def test_a_person_alone_keeps_the_number(track):

@@ -13,14 +13,16 @@ import tempfile
 from collections.abc import Iterable, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import memo
 from memo.run import NAME as RUN
 from memo.run import read_run
 
 __all__ = [
+    "Box",
     "InputError",
+    "Point",
     "UsageError",
     "check_apart",
     "check_default_out",
@@ -34,6 +36,7 @@ __all__ = [
     "is_url",
     "load_camera",
     "nothing_at",
+    "place_in_frame",
     "point_in_frame",
     "tracker_options",
     "two_sides",
@@ -48,7 +51,33 @@ class UsageError(InputError):
     """Options that have no meaning, or none together."""
 
 
-_POINT = re.compile(r"(\d+(?:\.\d+)?),(\d+(?:\.\d+)?)@(\d+)")
+class Point(NamedTuple):
+    """A point of the picture, pixels of the video, in a frame of the video."""
+
+    u_px: float
+    v_px: float
+    frame: int
+
+    def __str__(self) -> str:
+        return f"{self.u_px:g},{self.v_px:g}@{self.frame}"
+
+
+class Box(NamedTuple):
+    """A box in the picture, pixels of the video, in a frame of the video."""
+
+    left_px: float
+    top_px: float
+    width_px: float
+    height_px: float
+    frame: int
+
+    def __str__(self) -> str:
+        return f"{self.left_px:g},{self.top_px:g},{self.width_px:g},{self.height_px:g}@{self.frame}"
+
+
+_NUMBER = r"(\d+(?:\.\d+)?)"
+_POINT = re.compile(rf"{_NUMBER},{_NUMBER}@(\d+)")
+_BOX = re.compile(rf"{_NUMBER},{_NUMBER},{_NUMBER},{_NUMBER}@(\d+)")
 # At least two letters: one letter is a Windows drive. `Path` removes one of the two slashes.
 _URL = re.compile(r"([A-Za-z][A-Za-z0-9+.-]+):/+(.*)", re.DOTALL)
 
@@ -112,12 +141,26 @@ def heights(text: str | None) -> float | list[float] | None:
     return each[0] if len(each) == 1 else each
 
 
-def point_in_frame(text: str, option: str = "--follow") -> tuple[float, float, int]:
+def point_in_frame(text: str, option: str) -> Point:
     """A point of the picture in a frame, as in 320,240@50: pixels, and the frame's number in the video."""
     point = _POINT.fullmatch(text.strip())
     if point is None:
         raise InputError(f"{option} {text} is not a point in a frame: X,Y@F, such as 320,240@50")
-    return float(point[1]), float(point[2]), int(point[3])
+    return Point(float(point[1]), float(point[2]), int(point[3]))
+
+
+def place_in_frame(text: str) -> Point | Box:
+    """`--follow`: a point in a frame, or a box around somebody: left, top, width and height, as in
+    280,120,80,240@50."""
+    if point := _POINT.fullmatch(text.strip()):
+        return Point(float(point[1]), float(point[2]), int(point[3]))
+    box = _BOX.fullmatch(text.strip())
+    if box is None or not (float(box[3]) > 0 and float(box[4]) > 0):
+        raise InputError(
+            f"--follow {text} is neither a point in a frame, X,Y@F such as 320,240@50, nor a box: left, top, "
+            "width and height above 0, L,T,W,H@F such as 280,120,80,240@50"
+        )
+    return Box(float(box[1]), float(box[2]), float(box[3]), float(box[4]), int(box[5]))
 
 
 def checked_height(height_m: float) -> float:

@@ -14,7 +14,7 @@ from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -26,7 +26,7 @@ from memo.cycles import write_cycles_csv
 from memo.exits import Exit
 from memo.files import write_events_csv, write_track_csv
 from memo.gait import write_gait_parameters_csv
-from memo.given import InputError, check_apart, check_writable, nothing_at
+from memo.given import Box, InputError, Point, check_apart, check_writable, nothing_at
 from memo.left_out import LeftOut
 from memo.run import NAME as RUN
 from memo.run import Source, write_run
@@ -37,7 +37,6 @@ if TYPE_CHECKING:
     from memo.video import Frame, VideoReader
 
 __all__ = [
-    "Point",
     "Recorded",
     "Recording",
     "Stop",
@@ -79,14 +78,6 @@ def _never() -> Stop:
     return nullcontext(SimpleNamespace(requested=False))
 
 
-class Point(NamedTuple):
-    """A point of the picture, pixels of the video, in a frame of the video."""
-
-    u_px: float
-    v_px: float
-    frame: int
-
-
 @dataclass(frozen=True)
 class Recording:
     """A video, its known parameters, and what to write."""
@@ -103,7 +94,7 @@ class Recording:
     overlay: bool = True
     plots: bool = True
     page: bool = False
-    follow: Point | None = None
+    follow: Point | Box | None = None
     """Of several people, only the one who is there."""
     boxes: Path | None = None
     """MOTChallenge rows of the boxes around people, in place of looking for what moves."""
@@ -133,9 +124,9 @@ class Recorded:
     """Options, source, frames read and whether frames were left: the input of `write_run`."""
     written: list[Path] = field(default_factory=list)
     followed: int | None = None
-    """The person chosen by a point, counted among everybody who was tracked."""
+    """The person chosen by a point or a box, counted among everybody who was tracked."""
     not_there: str | None = None
-    """If nobody was tracked at that point: who was tracked where in its frame."""
+    """If nobody was tracked there: who was tracked where in its frame."""
 
     @property
     def interrupted(self) -> bool:
@@ -149,7 +140,7 @@ class Recorded:
 
     @property
     def exit(self) -> Exit:
-        """The exit code that reports whether anybody was tracked, at the point if one was given."""
+        """The exit code that reports whether anybody was tracked, at the place if one was given."""
         is_there = len(self.columns["frame"]) and self.not_there is None
         return Exit.TRACKED if is_there else Exit.NOBODY
 
@@ -221,9 +212,9 @@ def _track_recording(
             size=reader.full_size,
             boxes=recording.boxes,
         )
-        tracker, point = memo.Tracker(**options), recording.follow
+        tracker, place = memo.Tracker(**options), recording.follow
         boxes = None if recording.boxes is None else _boxes(recording.boxes, reader)
-        recorded = follow(reader, tracker, source, out, reader.frame_count, progress, stop, point, boxes)
+        recorded = follow(reader, tracker, source, out, reader.frame_count, progress, stop, place, boxes)
         if recorded.not_there is not None:
             remark(f"{video}: {recorded.not_there}")
         if reader.damage:
@@ -252,7 +243,7 @@ def follow(
     count: int | None = None,
     progress: Progress = _unseen,
     stop: Stop | None = None,
-    point: Point | None = None,
+    place: Point | Box | None = None,
     boxes: Mapping[int, npt.NDArray[np.float64]] | None = None,
 ) -> Recorded:
     """Passes all frames to the tracker, with the boxes of each frame; a stop ends it after the current frame.
@@ -269,12 +260,12 @@ def follow(
                 if asked.requested:
                     break
     except ValueError as error:
-        recorded = _recorded(tracker, source, frames_read, True, point)
+        recorded = _recorded(tracker, source, frames_read, True, place)
         if not len(recorded.columns["frame"]):
             raise
         write_tables(recorded, out)
         raise InputError(f"{error}; the tables hold what was tracked until then") from error
-    return _recorded(tracker, source, frames_read, asked.requested, point)
+    return _recorded(tracker, source, frames_read, asked.requested, place)
 
 
 def draw_overlay(
@@ -364,7 +355,7 @@ def _doubts(reader: VideoReader, camera_given: bool) -> Iterator[str]:
 
 
 def _recorded(
-    tracker: Any, source: Source, frames_read: int, interrupted: bool, point: Point | None
+    tracker: Any, source: Source, frames_read: int, interrupted: bool, place: Point | Box | None
 ) -> Recorded:
     """The track in pixels of the video, frames numbered as in the video (the tracker counts from 0)."""
     track: Track = tracker.finish()
@@ -372,13 +363,16 @@ def _recorded(
         track = track.of_video(source.shrink, source.size)
     first_frame = source.frames[0]
     followed = None
-    if point is not None:
-        followed = track.person_at(point.u_px, point.v_px, point.frame - first_frame)
+    if isinstance(place, Box):
+        box = place._replace(frame=place.frame - first_frame)
+        followed = track.person_in(*box)
+    elif place is not None:
+        followed = track.person_at(place.u_px, place.v_px, place.frame - first_frame)
     not_there = None
     if followed is not None:
         track = track.of_person(followed)
-    elif point is not None:
-        not_there = _not_there(track, point, first_frame, frames_read)
+    elif place is not None:
+        not_there = _not_there(track, place, first_frame, frames_read)
     track.camera_motion = replace(track.camera_motion, first_frame=first_frame)
     track.left_out = [left.of_video(1, first_frame) for left in track.left_out]
 
@@ -410,21 +404,18 @@ def _recorded(
     )
 
 
-def _not_there(track: Track, point: Point, first_frame: int, frames_read: int) -> str:
-    """Says who was tracked in the frame of a point where nobody was, and where."""
-    said = f"nobody was tracked at {point.u_px:g},{point.v_px:g}@{point.frame}"
-    if not first_frame <= point.frame < first_frame + frames_read:
+def _not_there(track: Track, place: Point | Box, first_frame: int, frames_read: int) -> str:
+    """Says who was tracked in the frame of a place where nobody was, and where."""
+    said = f"nobody was tracked at {place}"
+    if not first_frame <= place.frame < first_frame + frames_read:
         read = f"the frames that were read are {first_frame} to {first_frame + frames_read - 1}"
         return f"{said}, as {read}: the results are those of everybody"
     if not len(track):
         return said
     columns, middles = track.columns, []
-    for row in np.flatnonzero(columns["frame"] == point.frame - first_frame).tolist():
-        points = track.contours(row).reshape(-1, 2)
-        points = points[np.isfinite(points).all(axis=1)]
-        if len(points):
-            u_px, v_px = (points.min(axis=0) + points.max(axis=0)) / 2
-            middles.append(f"person {columns['person'][row]} at {u_px:.0f},{v_px:.0f}@{point.frame}")
+    for row, (low, high) in track.extents(place.frame - first_frame):
+        u_px, v_px = (low + high) / 2
+        middles.append(f"person {columns['person'][row]} at {u_px:.0f},{v_px:.0f}@{place.frame}")
     if middles:
         return f"{said}, but {' and '.join(middles)}: the results are those of everybody"
     known = []

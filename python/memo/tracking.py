@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import logging
-from collections.abc import Callable, Iterable, Mapping, Sequence, Sized
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Sized
 from dataclasses import replace
 from numbers import Integral
 from typing import TYPE_CHECKING, Any
@@ -390,15 +390,34 @@ class Track:
     def person_at(self, u_px: float, v_px: float, frame: int) -> int | None:
         """The person whose model covers a point of the picture in a frame; of several, the one whose middle
         is nearest. None if there is nobody."""
-        columns, found = self.columns, []
-        for row in np.flatnonzero(columns["frame"] == frame).tolist():
+        persons, found, point = self.columns["person"], [], np.array([u_px, v_px])
+        for row, (low, high) in self.extents(frame):
+            if (low <= point).all() and (point <= high).all():
+                found.append((float(np.linalg.norm(point - (low + high) / 2)), int(persons[row])))
+        return min(found)[1] if found else None
+
+    def person_in(
+        self, left_px: float, top_px: float, width_px: float, height_px: float, frame: int
+    ) -> int | None:
+        """The person who overlaps most with a box in a frame: intersection over union of the box and that
+        around the model. None if nobody shares half of the smaller of the two."""
+        persons, found = self.columns["person"], []
+        start, size = np.array([left_px, top_px]), np.array([width_px, height_px])
+        for row, (low, high) in self.extents(frame):
+            shared = float(np.prod(np.clip(np.minimum(high, start + size) - np.maximum(low, start), 0, None)))
+            areas = float(np.prod(high - low)), float(np.prod(size))
+            if shared > 0 and 2 * shared >= min(areas):
+                found.append((shared / (sum(areas) - shared), -int(persons[row])))
+        return -max(found)[1] if found else None
+
+    def extents(self, frame: int) -> Iterator[tuple[int, npt.NDArray[np.float64]]]:
+        """The rows of a frame, each with the box around its model: (2, 2) pixels, the corners at the upper
+        left and the lower right."""
+        for row in np.flatnonzero(self.columns["frame"] == frame).tolist():
             points = self.contours(row).reshape(-1, 2)
             points = points[np.isfinite(points).all(axis=1)]
-            low, high = (points.min(axis=0), points.max(axis=0)) if len(points) else (np.inf, -np.inf)
-            point = np.array([u_px, v_px])
-            if (low <= point).all() and (point <= high).all():
-                found.append((float(np.linalg.norm(point - (low + high) / 2)), int(columns["person"][row])))
-        return min(found)[1] if found else None
+            if len(points):
+                yield row, np.stack([points.min(axis=0), points.max(axis=0)])
 
     def of_person(self, person: int) -> Track:
         """The walks of one person alone, who keeps the number of the column `person`."""

@@ -23,7 +23,7 @@ from memo.batch.task import DEFECT, OUT_OF_MEMORY
 from memo.exits import Exit
 from memo.extras import install
 from memo.files import plain
-from memo.given import frame_range, heights, point_in_frame, tracker_options
+from memo.given import frame_range, heights, place_in_frame, tracker_options
 
 _READING = ("name", "unit", "size", "v_up")
 
@@ -47,7 +47,7 @@ def _track(arguments: Sequence[str]) -> Exit:
     if absent := [name for name in ("av", "matplotlib") if find_spec(name) is None]:
         _complain(f"a video needs {', '.join(absent)}: {install('app', *absent)}")
         return Exit.NO_EXTRA
-    from memo.recording import Point, Recording, track_recording
+    from memo.recording import Recording, track_recording
 
     command, *given, flag, out, as_json = arguments
     if (command, flag, as_json) != ("track", "--out", "--json"):
@@ -65,7 +65,7 @@ def _track(arguments: Sequence[str]) -> Exit:
             tracker_options(tall, camera, reading, options.pop("fov_deg", None), steady, treadmill),
             frame_range(options.pop("frames", ":")),
             page=options.pop("report", False),
-            follow=None if follow is None else Point(*point_in_frame(follow)),
+            follow=None if follow is None else place_in_frame(follow),
             camera_file=camera,
             **options,
         )

@@ -22,7 +22,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from memo.given import frame_range, heights, is_url, load_camera, nothing_at, point_in_frame, tracker_options
+from memo.given import frame_range, heights, is_url, load_camera, nothing_at, place_in_frame, tracker_options
 from memo.spreadsheet import CsvRows, Error
 from memo.wording import counted
 
@@ -433,7 +433,7 @@ def _check_options(row: Row) -> None:
         raise ValueError(f"fps {fps:g} is not a frame rate")
     frame_range(options.get("frames", ":"))
     if "follow" in options:
-        point_in_frame(options["follow"])
+        place_in_frame(options["follow"])
     if "boxes" in options and not options["boxes"].is_file():
         raise ValueError(nothing_at(options["boxes"], "file"))
     camera = options.get("camera")

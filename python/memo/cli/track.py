@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from memo.cli.delivery import Delivery, Interrupt, complain, guarded, with_steps
 from memo.exits import Exit
-from memo.given import check_default_out, default_out, frame_range, heights, point_in_frame, tracker_options
-from memo.recording import Point, Recorded, Recording, track_recording
+from memo.given import check_default_out, default_out, frame_range, heights, place_in_frame, tracker_options
+from memo.recording import Recorded, Recording, track_recording
 
 if TYPE_CHECKING:
     import typer
@@ -21,7 +21,7 @@ EPILOG = """Examples:
   memo track slow.mp4 --height 1.68 --fps 240 --frames 100:900
 
 Exit codes: 0 a walker was tracked; 1 the input cannot be used; 2 wrong usage; \
-3 the video was read but no walker was tracked, or none at the point of --follow; \
+3 the video was read but no walker was tracked, or none at the place of --follow; \
 4 the app extra is not installed; 130 interrupted (results up to then are written)."""
 
 
@@ -87,7 +87,9 @@ def add_track(app: "typer.Typer") -> None:
         follow: Annotated[
             str | None,
             typer.Option(
-                help="Of several people, keep only the one who is at pixel X,Y in frame F.", metavar="X,Y@F"
+                help="Of several people, keep only the one who is at pixel X,Y in frame F, or whose outline "
+                "overlaps most with a box in that frame: left, top, width and height.",
+                metavar="X,Y@F|L,T,W,H@F",
             ),
         ] = None,
         boxes: Annotated[
@@ -118,9 +120,9 @@ def add_track(app: "typer.Typer") -> None:
             reading = {"name": camera_name, "unit": camera_unit, "size": camera_size, "v_up": camera_v_up}
             options = tracker_options(heights(height), camera, reading, fov_deg, steady, treadmill)
             asked = frame_range(frames)
-            point = None if follow is None else Point(*point_in_frame(follow))
+            place = None if follow is None else place_in_frame(follow)
             drawn = (overlay, plots, page)
-            recording = Recording(video, options, asked, fps, shrink, *drawn, point, boxes, camera)
+            recording = Recording(video, options, asked, fps, shrink, *drawn, place, boxes, camera)
             return _track(recording, delivery)
 
         raise typer.Exit(guarded(work))
