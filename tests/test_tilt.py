@@ -94,6 +94,16 @@ def test_what_is_said_of_the_tilt():
     assert tilt_sentences(None) == []
 
 
+def test_the_tilt_is_a_finding_of_the_video_and_of_no_walk():
+    scene = memo.demo_scene(1, frames=45)
+    track = memo.track(list(scene.frames), fps=25, height_m=scene.height_m)
+    (tilted,) = tilt_sentences(track.walks[0].camera_tilt)
+    assert track.sentences[-1] == tilted
+    track.walks = track.walks * 2
+    assert any(said.startswith("Walk 1 (person 0): ") for said in track.sentences)
+    assert [said for said in track.sentences if tilted in said] == [tilted]
+
+
 def test_who_walks_in_a_picture_that_is_turned_has_the_angles_of_the_upright_one():
     """Against motion capture; assumed level, hips were 6 to 7 degrees off."""
     folder = shared_video("mocap_b")

@@ -128,7 +128,12 @@ def test_nobody_is_a_result(count):
 @pytest.mark.parametrize("size", [(1, 1), (2, 3), (7, 500)])
 def test_frames_too_small_for_a_person_are_no_error(size):
     noise = np.random.default_rng(0).integers(0, 256, (30, *size), dtype=np.uint8)
-    assert len(memo.track(noise, height_m=1.75, fps=25)) == 0
+    track = memo.track(noise, height_m=1.75, fps=25)
+    assert len(track) == 0
+    said = f"Nobody less than 30 pixels high is seen, and the picture has only {size[1]}x{size[0]}."
+    assert track.summary["message"].endswith(said) and track.sentences[0].endswith(said)
+    averaged = track.of_video(3, (3 * size[1], 3 * size[0])).summary["message"]
+    assert f"less than 90 pixels high is seen, and the picture has only {3 * size[1]}x" in averaged
 
 
 def test_noise_is_not_a_walker():

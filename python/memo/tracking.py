@@ -117,6 +117,7 @@ class Tracker:
                 self.options[name] = usual[name]
         self._core = _memo.Tracker(camera=camera, **self.options)
         self._camera = camera
+        self._size: tuple[int, int] | None = None
         self._walks: list[_memo.Walk] = []
 
     def update(
@@ -132,6 +133,8 @@ class Tracker:
         everybody's.
         """
         self._core.update(frame, time_s, boxes)
+        height, width = frame.shape
+        self._size = width, height
         return next(iter(self._core.people()), None)
 
     def people(self) -> list[_memo.WalkerState]:
@@ -156,6 +159,7 @@ class Tracker:
             camera_motion=motion,
             left_out=[LeftOut.of(left) for left in self._core.left_out()],
             options=self.options,
+            size=self._size,
         )
         if _log.isEnabledFor(logging.INFO):
             for sentence in found.sentences:
@@ -298,6 +302,9 @@ _REACH_M = 1.0
 _REACH_MPS = 2.5
 """Nobody walks farther than this within a second; the places themselves may be off by `_REACH_M`."""
 
+SMALLEST_PX = 30
+"""People less high in the tracked images have no limbs that are seen, as in `memo_core::track::left_out`."""
+
 _FRAMES = ("columns", "gait_parameters", "cycles")
 
 
@@ -319,6 +326,7 @@ class Track:
         camera_motion: CameraMotion | None = None,
         left_out: Sequence[LeftOut] = (),
         options: Mapping[str, Any] | None = None,
+        size: tuple[int, int] | None = None,
     ) -> None:
         self.walks: list[_memo.Walk] = list(walks)
         self._people = {person: k for k, person in enumerate(sorted({walk.person for walk in walks}))}
@@ -329,6 +337,7 @@ class Track:
         self._options: Mapping[str, Any] = _memo.defaults("track") if options is None else options
         self._is_everybody = True
         self._video_size = video_size
+        self._size = size
         self.camera_motion: CameraMotion = camera_motion or CameraMotion()
         """The camera in every frame; the world of the results is that of the first one."""
         self.left_out: list[LeftOut] = list(left_out)
@@ -474,7 +483,6 @@ class Track:
             told += [sentence for sentence in [fit_sentence(walk)] if sentence is not None]
             told += [self._message(walk), *self._joined(index)]
             told += measured_height_sentences(walk, camera_given=self._camera is not None)
-            told += tilt_sentences(walk.camera_tilt) if index == 0 else []
             unseen = cadence_sentences(self.gait_parameters, index)
             told += unseen
             told += running_sentences(walk, self._pace(walk)[0])
@@ -493,7 +501,7 @@ class Track:
             elif self.people[index] > 0:
                 whose = f"Person {self.people[index]}: "
             said += [whose + sentence for sentence in told]
-        return said + left_out
+        return said + tilt_sentences(self.walks[0].camera_tilt) + left_out
 
     def _height_sentences(self) -> list[str]:
         given = np.atleast_1d(np.asarray(self._options.get("height_m"))).tolist()
@@ -703,6 +711,12 @@ class Track:
             return (
                 f"Nobody was seen walking: something moves in only {counted(moving, 'frame')}, and a walk is "
                 f"found in {needed}."
+            )
+        if self._size is not None and min(self._size) < 1.5 * SMALLEST_PX:
+            width, height = (self.shrink * side for side in self._size)
+            return (
+                f"{_NOBODY[why]} Nobody less than {self.shrink * SMALLEST_PX} pixels high is seen, and the "
+                f"picture has only {width}x{height}."
             )
         if why == "not walking" and self._options.get("treadmill"):
             return f"{_NOBODY[why]} {_ONLY_ON_A_TREADMILL}"
