@@ -13,6 +13,7 @@ import border_fuzz
 import memo
 import numpy as np
 import pytest
+from memo import _memo
 
 FULL = bool(os.environ.get("MEMO_FULL"))
 CALLS = 1500 if FULL else 5
@@ -72,6 +73,97 @@ def test_numbers_beyond_all_memory_and_time_are_refused(name, call):
     program = f"import memo\ntry:\n    {call}\nexcept ValueError as error:\n    print(error)"
     run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60)
     assert run.stdout.startswith(f"{name} must be"), run.stderr
+
+
+CAMERA = memo.Camera.level((640, 480), 45.0, 1.2, 4.0)
+WALKER = memo.walker_motion(20)
+DISPLAY = memo.pointlight(WALKER.positions, WALKER.times_s, WALKER.names)
+
+
+def displayed(**options):
+    return memo.pointlight(WALKER.positions, WALKER.times_s, WALKER.names, **options)
+
+
+WHOLE_NUMBERS = {
+    "Camera size": lambda n: memo.Camera(CAMERA.matrix, CAMERA.rotation, CAMERA.translation, (n, 5)),
+    "Camera.level size": lambda n: memo.Camera.level((5, n), 45.0, 1.2, 4.0),
+    "Camera.from_parameters camera: size": lambda n: memo.Camera.from_parameters(
+        CAMERA.parameters() | {"size": [n, 5]}
+    ),
+    "Camera.shrunk n": CAMERA.shrunk,
+    "calibrate_points size": lambda n: memo.calibrate_points(np.zeros((6, 3)), np.zeros((6, 2)), (n, 5)),
+    "shrunk n": lambda n: _memo.shrunk(np.zeros((9, 9), np.uint8), n),
+    "walker_motion frames": memo.walker_motion,
+    "walker_motion cycles": lambda n: memo.walker_motion(cycles=n),
+    "demo_scene seed": memo.demo_scene,
+    "demo_scene frames": lambda n: memo.demo_scene(frames=n),
+    "Scene seed": _memo.Scene,
+    "Scene.time_s index": lambda n: _memo.Scene().time_s(n),
+    "pointlight seed": lambda n: displayed(seed=n),
+    "pointlight cycles": lambda n: displayed(cycles=n),
+    "pointlight noise_dots": lambda n: displayed(noise_dots=n),
+    "pointlight lifetime_frames": lambda n: displayed(lifetime_frames=n),
+    "pointlight life_dots": lambda n: displayed(lifetime_frames=2, life_dots=n),
+    "pointlight limbs": lambda n: displayed(lifetime_frames=2, limbs=[(0, n)]),
+    "frames start": lambda n: DISPLAY.frames(start=n),
+    "frames stop": lambda n: DISPLAY.frames(stop=n),
+    "frames size_px": lambda n: DISPLAY.frames(size_px=(n, 9)),
+    "frames colour": lambda n: DISPLAY.frames(colour=(n, 0, 0)),
+    "frames background": lambda n: DISPLAY.frames(background=(0, 0, n)),
+    "Tracker start_frames": lambda n: memo.Tracker(1.7, start_frames=n),
+    "hoffman_flinchbaugh_rods trials": lambda n: _memo.hoffman_flinchbaugh_rods(n, 0),
+    "hoffman_flinchbaugh_rods seed": lambda n: _memo.hoffman_flinchbaugh_rods(1, n),
+    "lee_chen_walker frames": lambda n: _memo.lee_chen_walker("SEQ1", n),
+    "rohr_deviations seed": _memo.rohr_deviations,
+}
+
+
+@pytest.mark.parametrize("number", [-1, 2**64, np.int64(-(2**40))])
+@pytest.mark.parametrize("argument", WHOLE_NUMBERS)
+def test_whole_numbers_that_a_type_does_not_hold_are_refused_by_name(argument, number):
+    name = argument.split(maxsplit=1)[1]
+    with pytest.raises(ValueError, match=rf"^{name} must be .*, got .*\d") as refused:
+        WHOLE_NUMBERS[argument](number)
+    assert "\n" not in str(refused.value)
+
+
+def test_numbers_beyond_all_digits_are_refused():
+    with pytest.raises(ValueError, match=r"^seed must be between 0 and \d+, got a value of type int$"):
+        displayed(seed=10**5000)
+
+
+@pytest.mark.parametrize("index", [-1, 80, 2**64])
+def test_a_frame_that_a_scene_does_not_have_is_an_index_error(index):
+    with pytest.raises(IndexError, match=f"^frame {index} of a scene with 80 frames$"):
+        _memo.Scene().frame(index)
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (
+            lambda: memo.stick_joints(5, np.zeros((1, 17, 2)), np.ones((1, 17))),
+            "^layout_or_names must be the name of a layout or a list of the names of points, got 5$",
+        ),
+        (
+            lambda: memo.head_points([1], np.zeros((1, 17, 2)), np.ones((1, 17))),
+            r"^layout_or_names must be .*, got \[1\]$",
+        ),
+        (
+            lambda: memo.Tracker("x"),
+            "^height_m must be a number of metres or a list with one for each person, got 'x'$",
+        ),
+        (
+            lambda: _memo.posture(
+                np.zeros(1), np.zeros((1, 14, 2)), np.ones((1, 14)), size=(640, 480), distance_m="x"
+            ),
+            "^distance_m must be a number of metres or one for each frame, got 'x'$",
+        ),
+    ],
+)
+def test_a_type_error_states_the_types_of_python_in_one_line(call, words):
+    with pytest.raises(TypeError, match=words):
+        call()
 
 
 def test_a_figure_of_no_size_is_refused():

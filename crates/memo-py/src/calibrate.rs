@@ -6,6 +6,7 @@ use crate::array::{
 use crate::camera::PyCamera;
 use crate::error::value_error;
 use crate::result::result;
+use crate::whole::{Size, size_px};
 use glam::{DVec2, DVec3};
 use memo_core::calibrate::{
     Estimate, KnownLens, PointOptions, WalkerOptions, WalkerSighting, sightings_from_joints,
@@ -78,13 +79,13 @@ pub fn calibrate_points(
     py: Python<'_>,
     places: &Bound<'_, PyAny>,
     pixels: &Bound<'_, PyAny>,
-    size: (u32, u32),
+    size: Size,
     focal_px: Option<f64>,
     lens: Option<PyCamera>,
 ) -> PyResult<PointCalibration> {
     let places: Vec<DVec3> = points_from_numpy(places)?.into_iter().map(DVec3::from).collect();
     let pixels = pixels_from_numpy(pixels)?;
-    let options = PointOptions { size: size.into(), lens: known_lens(focal_px, lens)? };
+    let options = PointOptions { size: size_px(size)?, lens: known_lens(focal_px, lens)? };
     let found = py.detach(|| camera_from_points(&places, &pixels, &options)).map_err(value_error)?;
     PointCalibration::of(py, found)
 }
@@ -99,7 +100,7 @@ pub fn calibrate_walker(
     py: Python<'_>,
     feet: &Bound<'_, PyAny>,
     heads: &Bound<'_, PyAny>,
-    size: (u32, u32),
+    size: Size,
     height_m: f64,
     foot_share: Option<Vec<f64>>,
     head_share: Option<Vec<f64>>,
@@ -124,7 +125,7 @@ pub fn calibrate_walker(
         head_share: head_share[i],
     };
     let sightings: Vec<WalkerSighting> = (0..feet.len()).map(sighting).collect();
-    let options = WalkerOptions { size: size.into(), height_m, lens: known_lens(focal_px, lens)? };
+    let options = WalkerOptions { size: size_px(size)?, height_m, lens: known_lens(focal_px, lens)? };
     let found = py.detach(|| camera_from_walker(&sightings, &options)).map_err(value_error)?;
     WalkerCalibration::of(py, found)
 }

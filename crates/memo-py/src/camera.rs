@@ -2,6 +2,7 @@
 
 use crate::array::{numpy_from_column, numpy_from_rows, numpy_of_shape, vectors_from_numpy};
 use crate::error::value_error;
+use crate::whole::{A_SIZE, Size, Whole, WholeNumbers, size_px};
 use glam::{DMat3, DVec2, DVec3};
 use memo_core::Camera;
 use memo_core::model::{
@@ -28,7 +29,7 @@ const POINTS: &str = "wanted points: numpy array of shape (..., 3)";
 /// The camera from the parameters of `Camera.__reduce__`.
 #[pyfunction(name = "_camera")]
 pub fn camera_of_parameters(
-    size: (u32, u32),
+    size: Size,
     focal_px: (f64, f64),
     centre_px: (f64, f64),
     lens: (String, Vec<f64>),
@@ -48,7 +49,7 @@ pub fn camera_of_parameters(
         return Err(PyValueError::new_err("the rotation must have 9 elements"));
     };
     let camera = Camera {
-        size: size.into(),
+        size: size_px(size)?,
         focal_px: focal_px.into(),
         centre_px: centre_px.into(),
         distortion,
@@ -68,7 +69,7 @@ impl PyCamera {
         matrix: &Bound<'_, PyAny>,
         rotation: &Bound<'_, PyAny>,
         translation: &Bound<'_, PyAny>,
-        size: (u32, u32),
+        size: Size,
         distortion: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let k = square(matrix, "matrix")?;
@@ -101,7 +102,7 @@ impl PyCamera {
             }
         };
         let camera = Camera {
-            size: size.into(),
+            size: size_px(size)?,
             focal_px: DVec2::new(k[0][0], k[1][1]),
             centre_px: DVec2::new(k[0][2], k[1][2]),
             distortion: Distortion::from_opencv(coefficients),
@@ -151,7 +152,7 @@ impl PyCamera {
         path: std::path::PathBuf,
         name: Option<&str>,
         unit: Option<&str>,
-        size: Option<(u32, u32)>,
+        size: Option<Size>,
         v_up: Option<bool>,
         lens_only: bool,
     ) -> PyResult<Self> {
@@ -161,7 +162,7 @@ impl PyCamera {
         let options = CameraFileOptions {
             name,
             unit: unit.map(of_name).transpose()?,
-            size: size.map(Into::into),
+            size: size.map(size_px).transpose()?,
             is_lens_only: lens_only,
             v_up,
         };
@@ -190,7 +191,7 @@ impl PyCamera {
     #[pyo3(signature = (*, size, pixel_mm, focal_mm, kappa1_per_mm2, centre_px, sx, translation_mm, rotation_rad))]
     #[allow(clippy::too_many_arguments, reason = "Tsai's model has this many parameters")]
     fn from_tsai(
-        size: (u32, u32),
+        size: Size,
         pixel_mm: (f64, f64),
         focal_mm: f64,
         kappa1_per_mm2: f64,
@@ -200,7 +201,7 @@ impl PyCamera {
         rotation_rad: (f64, f64, f64),
     ) -> PyResult<Self> {
         let tsai = TsaiParameters {
-            size: size.into(),
+            size: size_px(size)?,
             pixel_mm: DVec2::from(pixel_mm),
             focal_mm,
             kappa1_per_mm2,
@@ -215,8 +216,8 @@ impl PyCamera {
     /// A level camera without distortion that looks along world Y. The origin is on the ground, `distance_m` in
     /// front of it.
     #[staticmethod]
-    fn level(size: (u32, u32), fov_deg: f64, camera_height_m: f64, distance_m: f64) -> PyResult<Self> {
-        Camera::level(size.into(), fov_deg.to_radians(), camera_height_m, distance_m)
+    fn level(size: Size, fov_deg: f64, camera_height_m: f64, distance_m: f64) -> PyResult<Self> {
+        Camera::level(size_px(size)?, fov_deg.to_radians(), camera_height_m, distance_m)
             .map(Self)
             .map_err(value_error)
     }
@@ -229,7 +230,7 @@ impl PyCamera {
         let kappa: Option<f64> = parameters.get_item("tsai_kappa")?.map(|k| k.extract()).transpose()?;
         let turn = DVec3::from_array(parameter(parameters, "rotation")?);
         let camera = Camera {
-            size: parameter(parameters, "size")?,
+            size: parameter::<[Whole<u32>; 2]>(parameters, "size")?.must_be("camera: size", A_SIZE)?,
             focal_px: DVec2::new(matrix[0][0], matrix[1][1]),
             centre_px: DVec2::new(matrix[0][2], matrix[1][2]),
             distortion: kappa
@@ -242,7 +243,8 @@ impl PyCamera {
 
     /// The camera for the same images with `n` by `n` pixels averaged to one, as in `VideoReader` with
     /// `shrink=n`.
-    fn shrunk(&self, n: u32) -> PyResult<Self> {
+    fn shrunk(&self, n: Whole<u32>) -> PyResult<Self> {
+        let n = n.must_be("n", "between 1 and the shorter side of the pictures")?;
         self.0.shrunk(n).map(Self).map_err(value_error)
     }
 

@@ -8,6 +8,7 @@ use crate::record::{Recorded, refused};
 use crate::result::result;
 use crate::tracker::PyTracker;
 use crate::wait::pooled;
+use crate::whole::{FROM_0, Whole, WholeNumbers};
 use glam::{DVec2, Vec2};
 use memo_core::image::Rectangle;
 use memo_core::model::{EllipticCylinder, Others};
@@ -103,8 +104,10 @@ impl PyExplainer {
     fn new(
         tracker: &Bound<'_, PyTracker>,
         records: Vec<Bound<'_, PyDict>>,
-        wanted: HashSet<usize>,
+        wanted: &Bound<'_, PyAny>,
     ) -> PyResult<Self> {
+        let frame = |n: PyResult<Bound<'_, PyAny>>| n?.extract::<Whole<usize>>()?.must_be("wanted", FROM_0);
+        let wanted = wanted.try_iter()?.map(frame).collect::<PyResult<_>>()?;
         let options = options_of(tracker)?;
         let walks = records.iter().map(|r| Recorded::read(r)).collect::<PyResult<_>>()?;
         let stream = Some(options.evidence_stream());

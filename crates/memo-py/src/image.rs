@@ -5,6 +5,7 @@ use crate::defaults::dict;
 use crate::error::value_error;
 use crate::wait::interruptible;
 use crate::walk::CameraTilt;
+use crate::whole::{Whole, WholeNumbers};
 use memo_core::Image;
 use memo_core::image::silhouettes as core_silhouettes;
 use memo_core::image::{
@@ -22,8 +23,9 @@ use pyo3::types::PyDict;
 pub fn shrunk<'py>(
     py: Python<'py>,
     frame: &Bound<'py, PyAny>,
-    n: usize,
+    n: Whole<usize>,
 ) -> PyResult<Bound<'py, PyArray2<u8>>> {
+    let n = n.must_be("n", "between 1 and the shorter side of the frame")?;
     let frame = frame_from_numpy(frame)?;
     let frame = frame.as_frame()?;
     numpy_from_image(py, py.detach(|| core_shrunk(&frame, n)).map_err(value_error)?)

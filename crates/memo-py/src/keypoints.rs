@@ -1,7 +1,8 @@
 //! Keypoint detectors: names and orders of their points, and the joints of the stick figure.
 
 use crate::array::{numpy_from_column, numpy_from_track, scores_from_numpy, track_from_numpy};
-use crate::error::value_error;
+use crate::error::{value_error, wrong_type};
+use crate::whole::{Whole, WholeNumbers};
 use glam::DVec2;
 use memo_core::keypoints::people::{FollowOptions, follow_everyone as core_follow_everyone};
 use memo_core::keypoints::{DetectorError, LAYOUTS, WeightedPoints, joint_name as core_joint_name};
@@ -42,12 +43,23 @@ pub fn joint_name(name: &str) -> PyResult<Option<&'static str>> {
 }
 
 /// A layout's name, or the names of the points.
-#[derive(FromPyObject)]
 pub enum LayoutOrNames {
     /// The name of a layout.
     Layout(String),
     /// The names of the points.
     Names(Vec<String>),
+}
+
+impl<'py> FromPyObject<'_, 'py> for LayoutOrNames {
+    type Error = PyErr;
+
+    fn extract(object: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
+        if let Ok(name) = object.extract() {
+            return Ok(Self::Layout(name));
+        }
+        let wanted = "the name of a layout or a list of the names of points";
+        object.extract().map(Self::Names).map_err(|_| wrong_type("layout_or_names", wanted, &object))
+    }
 }
 
 impl LayoutOrNames {
@@ -138,10 +150,11 @@ type NumbersAndDoubts = (Vec<Option<usize>>, Vec<(usize, usize, i64, f64)>);
 #[pyfunction]
 pub fn follow_everyone(
     py: Python<'_>,
-    frames: Vec<i64>,
+    frames: Vec<Whole<i64>>,
     points: &Bound<'_, PyAny>,
     scores: &Bound<'_, PyAny>,
 ) -> PyResult<NumbersAndDoubts> {
+    let frames = frames.must_be("frames", "whole numbers of 64 bits")?;
     let people = track_from_numpy(points)?;
     let scores = scores_from_numpy(scores, &people)?;
     let options = FollowOptions::default();

@@ -26,6 +26,7 @@ mod tracker;
 mod unswap;
 mod wait;
 mod walk;
+mod whole;
 
 use pyo3::prelude::*;
 

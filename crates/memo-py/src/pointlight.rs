@@ -5,6 +5,7 @@ use crate::camera::PyCamera;
 use crate::defaults::dict;
 use crate::error::value_error;
 use crate::result::result;
+use crate::whole::{A_BYTE, FROM_0, FROM_1, Whole, WholeNumbers};
 use glam::{DVec2, DVec3};
 use memo_core::model::GaitStyle;
 use memo_core::synth::{
@@ -77,36 +78,40 @@ result! {
         ///
         /// Defaults: `size_px` (640, 640), `dot_px` 10, `shape` "disc", `colour` (255, 255, 255), `background`
         /// (0, 0, 0), `smooth` True.
-        #[pyo3(signature = (
-            *, size_px=None, centre_px=None, dot_px=None, shape=None, colour=None, background=None, smooth=true,
-            alpha=false, start=0, stop=None
-        ))]
+        #[pyo3(
+            signature = (
+                *, size_px=None, centre_px=None, dot_px=None, shape=None, colour=None, background=None, smooth=true,
+                alpha=false, start=Whole::from(0), stop=None
+            ),
+            text_signature = "($self, *, size_px=None, centre_px=None, dot_px=None, shape=None, colour=None, background=None, smooth=True, alpha=False, start=0, stop=None)"
+        )]
         #[allow(clippy::too_many_arguments, reason = "each is a property of a picture")]
         fn frames<'py>(
             &self,
             py: Python<'py>,
-            size_px: Option<[usize; 2]>,
+            size_px: Option<[Whole<usize>; 2]>,
             centre_px: Option<[f64; 2]>,
             dot_px: Option<f64>,
             shape: Option<&str>,
-            colour: Option<[u8; 3]>,
-            background: Option<[u8; 3]>,
+            colour: Option<[Whole<u8>; 3]>,
+            background: Option<[Whole<u8>; 3]>,
             smooth: bool,
             alpha: bool,
-            start: usize,
-            stop: Option<usize>,
+            start: Whole<usize>,
+            stop: Option<Whole<usize>>,
         ) -> PyResult<Bound<'py, PyArrayDyn<u8>>> {
             let usual = DotPicture::default();
             let picture = DotPicture {
-                size_px: size_px.unwrap_or(usual.size_px),
+                size_px: size_px.must_be("size_px", "between 1 and 16384 pixels")?.unwrap_or(usual.size_px),
                 centre_px: centre_px.map(DVec2::from),
                 dot_px: dot_px.unwrap_or(usual.dot_px),
                 shape: shape.map(|name| chosen("shape", name, SHAPES)).transpose()?.unwrap_or(usual.shape),
-                colour: colour.unwrap_or(usual.colour),
-                background: background.unwrap_or(usual.background),
+                colour: colour.must_be("colour", A_BYTE)?.unwrap_or(usual.colour),
+                background: background.must_be("background", A_BYTE)?.unwrap_or(usual.background),
                 is_smooth: smooth,
             };
             picture.check().map_err(value_error)?;
+            let (start, stop) = (start.must_be("start", FROM_0)?, stop.must_be("stop", FROM_0)?);
             drawn(py, &self.core(py)?, &picture, alpha, start, stop)
         }
     }
@@ -226,14 +231,16 @@ pub fn pointlight_cycle(
 #[allow(clippy::too_many_arguments, reason = "each is a property of the walk")]
 pub fn walker_motion(
     py: Python<'_>,
-    frames: Option<usize>,
+    frames: Option<Whole<usize>>,
     rate_hz: Option<f64>,
     speed_mps: Option<f64>,
     heading_deg: Option<f64>,
     phase: Option<f64>,
     height_m: Option<f64>,
-    cycles: Option<usize>,
+    cycles: Option<Whole<usize>>,
 ) -> PyResult<WalkerMotion> {
+    let frames = frames.must_be("frames", "between 1 and 1000000")?;
+    let cycles = cycles.must_be("cycles", FROM_1)?;
     if frames.is_some() && cycles.is_some() {
         return Err(PyValueError::new_err("give either frames or cycles"));
     }
@@ -292,7 +299,7 @@ pub fn pointlight(
     px_per_m: Option<f64>,
     camera: Option<PyCamera>,
     locomotion: Option<&str>,
-    cycles: Option<usize>,
+    cycles: Option<Whole<usize>>,
     tempo: Option<f64>,
     inverted: bool,
     mirrored: bool,
@@ -304,37 +311,45 @@ pub fn pointlight(
     period_s: Option<f64>,
     cycle_start_s: Option<f64>,
     max_shift_s: Option<f64>,
-    lifetime_frames: Option<usize>,
-    life_dots: Option<usize>,
+    lifetime_frames: Option<Whole<usize>>,
+    life_dots: Option<Whole<usize>>,
     life_sites: Option<&str>,
-    limbs: Option<Vec<[usize; 2]>>,
+    limbs: Option<Vec<[Whole<usize>; 2]>>,
     synchronous: bool,
-    noise_dots: Option<usize>,
+    noise_dots: Option<Whole<usize>>,
     noise_kind: Option<&str>,
     noise_area: Option<f64>,
     noise_speed_px_s: Option<f64>,
     noise_sd_px: Option<f64>,
-    seed: Option<u64>,
+    seed: Option<Whole<u64>>,
 ) -> PyResult<PointLightDisplay> {
+    let lifetime_frames = lifetime_frames.must_be("lifetime_frames", FROM_1)?;
+    let life_dots = life_dots.must_be("life_dots", FROM_1)?;
+    let limbs = limbs.must_be("limbs", "pairs of indices from 0")?;
     let motion = motion_of(positions, times_s, names)?;
     let usual = PointLightOptions::default();
     let parallel = parallel(&usual.view, azimuth_deg, elevation_deg, px_per_m);
     let locomotion = locomotion.map(|name| chosen("locomotion", name, LOCOMOTIONS)).transpose()?;
     let life = |frames| limited_life(frames, life_dots, life_sites, limbs, synchronous);
     let options = PointLightOptions {
-        seed: seed.unwrap_or(usual.seed),
+        seed: seed.must_be("seed", FROM_0)?.unwrap_or(usual.seed),
         view: camera.map_or(parallel, |camera| DisplayView::Perspective(Box::new(camera.0))),
         locomotion: locomotion.unwrap_or(usual.locomotion),
         is_inverted: inverted,
         is_mirrored: mirrored,
         is_reversed: reversed,
-        cycles: repeated(cycles, tempo)?,
+        cycles: repeated(cycles.must_be("cycles", FROM_1)?, tempo)?,
         period_s,
         cycle_start_s,
         scrambles_position: moved(scramble_position, scramble_axes, scramble_limit_px)?,
         scrambles_phase: shifts(scramble_phase, max_shift_s)?,
         limited_life: lifetime_frames.map(life).transpose()?,
-        noise_dots: noise(noise_dots, noise_kind, noise_area, noise_speed_px_s)?,
+        noise_dots: noise(
+            noise_dots.must_be("noise_dots", FROM_0)?,
+            noise_kind,
+            noise_area,
+            noise_speed_px_s,
+        )?,
         noise_sd_px: noise_sd_px.unwrap_or(usual.noise_sd_px),
     };
     let shown = py.detach(|| point_light_display(&motion, &options)).map_err(value_error)?;

@@ -6,9 +6,10 @@ use crate::array::{
 };
 use crate::camera::PyCamera;
 use crate::defaults::dict;
-use crate::error::value_error;
+use crate::error::{value_error, wrong_type};
 use crate::result::result;
 use crate::wait::watched;
+use crate::whole::{FROM_0, Size, Whole, WholeNumbers, size_px};
 use glam::{DVec2, DVec3};
 use memo_core::model::angles::{JointAngles, ankle_flexion_rad};
 use memo_core::model::{
@@ -188,12 +189,23 @@ fn levels<'py>(
 }
 
 /// One distance for all frames, or one per frame.
-#[derive(FromPyObject)]
 pub enum Distances {
     /// The same for all frames.
     One(f64),
     /// One per frame.
     Each(Vec<f64>),
+}
+
+impl<'py> FromPyObject<'_, 'py> for Distances {
+    type Error = PyErr;
+
+    fn extract(object: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
+        if let Ok(distance_m) = object.extract() {
+            return Ok(Self::One(distance_m));
+        }
+        let wanted = "a number of metres or one for each frame";
+        object.extract().map(Self::Each).map_err(|_| wrong_type("distance_m", wanted, &object))
+    }
 }
 
 /// Postures of one person: times (T,) s, points (T, 14, 2) px of the stick figure's joints with NaN if missing,
@@ -212,7 +224,7 @@ pub fn posture(
     points: &Bound<'_, PyAny>,
     weights: &Bound<'_, PyAny>,
     camera: Option<&PyCamera>,
-    size: Option<(u32, u32)>,
+    size: Option<Size>,
     fov_deg: Option<f64>,
     lengths: Option<HashMap<String, f64>>,
     height_m: Option<f64>,
@@ -226,10 +238,11 @@ pub fn posture(
     head_points: Option<&Bound<'_, PyAny>>,
     foot_points: Option<&Bound<'_, PyAny>>,
     group_m: Option<f64>,
-    max_groups: Option<usize>,
+    max_groups: Option<Whole<usize>>,
     keep_all: bool,
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<PostureSequence> {
+    let (size, max_groups) = (size.map(size_px).transpose()?, max_groups.must_be("max_groups", FROM_0)?);
     let times_s = times_from_numpy(times_s)?;
     let track = track_from_numpy(points)?;
     if track.joints != JOINT_COUNT {
@@ -258,8 +271,8 @@ pub fn posture(
     let camera = match (camera, size) {
         (Some(camera), None) if fov_deg.is_none() => camera.0.clone(),
         (None, Some(size)) => {
-            let fov_rad = fov_deg.map_or_else(|| assumed_field_of_view_rad(size.into()), f64::to_radians);
-            Camera::assumed(size.into(), fov_rad).map_err(value_error)?
+            let fov_rad = fov_deg.map_or_else(|| assumed_field_of_view_rad(size), f64::to_radians);
+            Camera::assumed(size, fov_rad).map_err(value_error)?
         }
         _ => {
             let wanted = "wanted a camera, or the size of the pictures with or without their field of view";

@@ -3,6 +3,7 @@
 use crate::array::{numpy_from_column, numpy_from_segments};
 use crate::camera::PyCamera;
 use crate::error::value_error;
+use crate::whole::{Whole, WholeNumbers};
 use glam::{DVec2, DVec3};
 use memo_core::image::Rectangle;
 use memo_core::model::{
@@ -350,8 +351,9 @@ impl Recorded {
 pub fn recorded_contours<'py>(
     py: Python<'py>,
     record: &Bound<'py, PyDict>,
-    frames: Vec<i64>,
+    frames: Vec<Whole<i64>>,
 ) -> PyResult<Vec<SegmentsWithParts<'py>>> {
+    let frames = frames.must_be("frames", "whole numbers of 64 bits")?;
     let walk = Recorded::read(record)?;
     let contours = |frame: i64| walk.contours(py, usize::try_from(frame).unwrap_or(usize::MAX));
     frames.into_iter().map(contours).collect()

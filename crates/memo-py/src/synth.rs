@@ -3,33 +3,39 @@
 use crate::array::numpy_from_image;
 use crate::camera::PyCamera;
 use crate::error::value_error;
+use crate::whole::{FROM_0, Whole, WholeNumbers};
 use memo_core::model::{SideAngles, SideJoints};
 use memo_core::synth::{ClothedOptions, Mover, Pause, SceneOptions};
 use memo_core::wording::counted;
 use memo_core::{ClothedScene, Image, SynthScene};
 use numpy::{PyArray2, PyArray3, PyArrayMethods};
-use pyo3::exceptions::{PyIndexError, PyValueError};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 /// Maximum number of frames: half a day at 25 frames per second.
 const MOST_FRAMES: usize = 1_000_000;
+
+/// A seed, and a number of frames of at least `least`.
+fn seed_and_frames(seed: Whole<u64>, frames: Whole<usize>, least: usize) -> PyResult<(u64, usize)> {
+    let (wanted, range) = (format!("between {least} and {MOST_FRAMES}"), least..=MOST_FRAMES);
+    let (seed, frames) = (seed.must_be("seed", FROM_0)?, frames.must_be("frames", &wanted)?);
+    if range.contains(&frames) {
+        return Ok((seed, frames));
+    }
+    Err(PyValueError::new_err(format!("frames must be {wanted}, got {frames}")))
+}
 
 /// Centre of the torso, phase, and joints (2, 6, 3) or joint angles.
 type Truth<T> = ((f64, f64, f64), f64, T);
 
 fn grey_frame(
     py: Python<'_>,
-    index: usize,
+    index: Whole<usize>,
     count: usize,
-    draw: impl FnOnce() -> Image<u8> + Send,
+    draw: impl FnOnce(usize) -> Image<u8> + Send,
 ) -> PyResult<Bound<'_, PyArray2<u8>>> {
-    if index >= count {
-        return Err(PyIndexError::new_err(format!(
-            "frame {index} of a scene with {}",
-            counted(count, "frame")
-        )));
-    }
-    numpy_from_image(py, py.detach(draw))
+    let index = index.index(count, "frame", &format!("a scene with {}", counted(count, "frame")))?;
+    numpy_from_image(py, py.detach(|| draw(index)))
 }
 
 fn joints_array(py: Python<'_>, sides: [SideJoints; 2]) -> PyResult<Bound<'_, PyArray3<f64>>> {
@@ -50,11 +56,17 @@ pub struct PyClothedScene(ClothedScene);
 #[pymethods]
 impl PyClothedScene {
     #[new]
-    #[pyo3(signature = (seed=0, *, frames=80, noise_sd=None, leftward=None, late_left=None, slant_rad=None, turn_rad=0.0, pause_s=None, mover="walker"))]
+    #[pyo3(
+        signature = (
+            seed=Whole::from(0), *, frames=Whole::from(80), noise_sd=None, leftward=None, late_left=None, slant_rad=None,
+            turn_rad=0.0, pause_s=None, mover="walker"
+        ),
+        text_signature = "(seed=0, *, frames=80, noise_sd=None, leftward=None, late_left=None, slant_rad=None, turn_rad=0.0, pause_s=None, mover=\"walker\")"
+    )]
     #[allow(clippy::too_many_arguments, reason = "keywords in Python")]
     fn new(
-        seed: u64,
-        frames: usize,
+        seed: Whole<u64>,
+        frames: Whole<usize>,
         noise_sd: Option<f32>,
         leftward: Option<bool>,
         late_left: Option<f64>,
@@ -63,6 +75,7 @@ impl PyClothedScene {
         pause_s: Option<(f64, f64)>,
         mover: &str,
     ) -> PyResult<Self> {
+        let (seed, frames) = seed_and_frames(seed, frames, 1)?;
         let mover = match mover {
             "walker" => Mover::Walker,
             "rider" => Mover::Rider,
@@ -75,11 +88,6 @@ impl PyClothedScene {
                 return Err(PyValueError::new_err(message));
             }
         };
-        if !(1..=MOST_FRAMES).contains(&frames) {
-            return Err(PyValueError::new_err(format!(
-                "frames must be between 1 and {MOST_FRAMES}, got {frames}"
-            )));
-        }
         let options = ClothedOptions {
             seed,
             frames,
@@ -96,13 +104,13 @@ impl PyClothedScene {
     }
 
     /// One grey frame, (H, W) uint8.
-    fn frame<'py>(&self, py: Python<'py>, index: usize) -> PyResult<Bound<'py, PyArray2<u8>>> {
-        grey_frame(py, index, self.0.len(), || self.0.frame(index))
+    fn frame<'py>(&self, py: Python<'py>, index: Whole<usize>) -> PyResult<Bound<'py, PyArray2<u8>>> {
+        grey_frame(py, index, self.0.len(), |index| self.0.frame(index))
     }
 
     /// Time of a frame, seconds.
-    fn time_s(&self, index: usize) -> f64 {
-        self.0.time_s(index)
+    fn time_s(&self, index: Whole<usize>) -> PyResult<f64> {
+        Ok(self.0.time_s(index.must_be("index", FROM_0)?))
     }
 
     /// The true state in a frame: torso centre (x, y, z), phase, the 12 joints (2, 6, 3) in the order right then
@@ -111,16 +119,16 @@ impl PyClothedScene {
     fn truth<'py>(
         &self,
         py: Python<'py>,
-        index: usize,
+        index: Whole<usize>,
     ) -> PyResult<Option<Truth<(Bound<'py, PyArray3<f64>>, [f64; 8])>>> {
-        let Some(truth) = self.0.truth(index) else { return Ok(None) };
+        let Some(truth) = self.0.truth(index.must_be("index", FROM_0)?) else { return Ok(None) };
         let joints = joints_array(py, [truth.right, truth.left])?;
         Ok(Some((truth.torso_centre.into(), truth.phase, (joints, angles_deg(truth.angles)))))
     }
 
     /// Direction of the path where the person is in a frame, radians; None if nobody walks.
-    fn heading_at(&self, index: usize) -> Option<f64> {
-        self.0.truth(index).map(|truth| truth.heading_rad)
+    fn heading_at(&self, index: Whole<usize>) -> PyResult<Option<f64>> {
+        Ok(self.0.truth(index.must_be("index", FROM_0)?).map(|truth| truth.heading_rad))
     }
 
     /// Initial contacts and toe-offs: time in seconds, kind and side.
@@ -164,31 +172,31 @@ pub struct PyScene(SynthScene);
 #[pymethods]
 impl PyScene {
     #[new]
-    #[pyo3(signature = (seed=0, *, frames=80, noise_sd=5.0, leftward=None, late_left=0.0))]
+    #[pyo3(
+        signature = (seed=Whole::from(0), *, frames=Whole::from(80), noise_sd=5.0, leftward=None, late_left=0.0),
+        text_signature = "(seed=0, *, frames=80, noise_sd=5.0, leftward=None, late_left=0.0)"
+    )]
     fn new(
-        seed: u64,
-        frames: usize,
+        seed: Whole<u64>,
+        frames: Whole<usize>,
         noise_sd: f32,
         leftward: Option<bool>,
         late_left: f64,
     ) -> PyResult<Self> {
-        let options = SceneOptions { seed, frames, noise_sd, leftward, late_left, ..SceneOptions::default() };
-        let least = options.empty_frames + 1;
-        if !(least..=MOST_FRAMES).contains(&frames) {
-            let message = format!("frames must be between {least} and {MOST_FRAMES}, got {frames}");
-            return Err(PyValueError::new_err(message));
-        }
+        let usual = SceneOptions::default();
+        let (seed, frames) = seed_and_frames(seed, frames, usual.empty_frames + 1)?;
+        let options = SceneOptions { seed, frames, noise_sd, leftward, late_left, ..usual };
         SynthScene::new(options).map(Self).map_err(value_error)
     }
 
     /// One grey frame, (H, W) uint8.
-    fn frame<'py>(&self, py: Python<'py>, index: usize) -> PyResult<Bound<'py, PyArray2<u8>>> {
-        grey_frame(py, index, self.0.len(), || self.0.frame(index))
+    fn frame<'py>(&self, py: Python<'py>, index: Whole<usize>) -> PyResult<Bound<'py, PyArray2<u8>>> {
+        grey_frame(py, index, self.0.len(), |index| self.0.frame(index))
     }
 
     /// Time of a frame, seconds.
-    fn time_s(&self, index: usize) -> f64 {
-        self.0.time_s(index)
+    fn time_s(&self, index: Whole<usize>) -> PyResult<f64> {
+        Ok(self.0.time_s(index.must_be("index", FROM_0)?))
     }
 
     /// The true state in a frame: torso centre (x, y, z), phase, the 12 joints (12, 3) in the order right then
@@ -197,9 +205,9 @@ impl PyScene {
     fn truth<'py>(
         &self,
         py: Python<'py>,
-        index: usize,
+        index: Whole<usize>,
     ) -> PyResult<Option<Truth<Bound<'py, PyArray3<f64>>>>> {
-        let Some(truth) = self.0.truth(index) else { return Ok(None) };
+        let Some(truth) = self.0.truth(index.must_be("index", FROM_0)?) else { return Ok(None) };
         let joints = joints_array(py, [truth.posed.right, truth.posed.left])?;
         Ok(Some((truth.posed.torso_centre.into(), truth.hypothesis.phase, joints)))
     }

@@ -3,11 +3,12 @@
 use crate::array::{boxes_from_numpy, frame_from_numpy};
 use crate::camera::PyCamera;
 use crate::defaults::dict;
-use crate::error::value_error;
+use crate::error::{value_error, wrong_type};
 use crate::result::{objects, result};
 use crate::steady::{FrameMotion, LostView};
 use crate::wait::{LOOK, watched};
 use crate::walk::Walk;
+use crate::whole::{Whole, WholeNumbers};
 use memo_core::image::{BackgroundOptions, FlowOptions};
 use memo_core::model::DEFAULT_HORIZONTAL_FIELD_OF_VIEW_RAD;
 use memo_core::track::fit::FitOptions;
@@ -109,11 +110,22 @@ fn box_of(shot: &Shot) -> [usize; 5] {
 }
 
 /// Body heights, metres.
-#[derive(FromPyObject)]
 enum Heights {
     Everybody(f64),
     /// Of people in order of appearance.
     Each(Vec<f64>),
+}
+
+impl<'py> FromPyObject<'_, 'py> for Heights {
+    type Error = PyErr;
+
+    fn extract(object: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
+        if let Ok(height_m) = object.extract() {
+            return Ok(Self::Everybody(height_m));
+        }
+        let wanted = "a number of metres or a list with one for each person";
+        object.extract().map(Self::Each).map_err(|_| wrong_type("height_m", wanted, &object))
+    }
 }
 
 /// A tracker shared by calls, one at a time.
@@ -222,7 +234,7 @@ impl PyTracker {
         fov_deg: Option<f64>,
         gait: Option<&str>,
         adapt: bool,
-        start_frames: Option<i64>,
+        start_frames: Option<Whole<usize>>,
         treadmill: Option<bool>,
         compensate_gain: bool,
         background: bool,
@@ -264,11 +276,8 @@ impl PyTracker {
         similarity.part_weights = part_weights.unwrap_or(similarity.part_weights);
         options.treadmill = treadmill;
         options.fit = adapt.then(FitOptions::default);
-        if let Some(frames) = start_frames {
-            let refused =
-                |_| PyValueError::new_err(format!("start_frames must be between 5 and 100, got {frames}"));
-            options.start_frames = usize::try_from(frames).map_err(refused)?;
-        }
+        let start_frames = start_frames.must_be("start_frames", "between 5 and 100")?;
+        options.start_frames = start_frames.unwrap_or(options.start_frames);
         let tracker = Mutex::new(Some(Box::new(Tracker::new(options).map_err(value_error)?)));
         Ok(Self(Arc::new(Shared { tracker, returned: Condvar::new(), calls: AtomicU64::new(0) })))
     }

@@ -9,6 +9,7 @@ use crate::fit::WalkFit;
 use crate::record::{Recorded, SegmentsWithParts, WalkRecord};
 use crate::result::{objects, result};
 use crate::wait::watched;
+use crate::whole::Whole;
 use glam::{DVec2, DVec3};
 use memo_core::calibrate::TiltEstimate;
 use memo_core::model::SideJoints;
@@ -19,7 +20,7 @@ use memo_core::track::{Event, Row, height, plausible, treadmill};
 use memo_core::wording::counted;
 use memo_core::{Image, TrackedWalk};
 use numpy::{PyArray1, PyArray2};
-use pyo3::exceptions::{PyIndexError, PyRuntimeError, PyValueError};
+use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::sync::OnceLock;
@@ -240,12 +241,9 @@ result! {
     }; methods {
         /// Visible contours of the model in a row, in pixels of its frame: (segments, 2, 2), and the body part of each
         /// segment.
-        fn contours<'py>(&self, py: Python<'py>, row: usize) -> PyResult<SegmentsWithParts<'py>> {
+        fn contours<'py>(&self, py: Python<'py>, row: Whole<usize>) -> PyResult<SegmentsWithParts<'py>> {
             let rows = self.__len__(py);
-            if row >= rows {
-                let message = format!("row {row} of a walk with {}", counted(rows, "row"));
-                return Err(PyIndexError::new_err(message));
-            }
+            let row = row.index(rows, "row", &format!("a walk with {}", counted(rows, "row")))?;
             let recorded = match self.recorded.get() {
                 Some(recorded) => recorded,
                 None => {

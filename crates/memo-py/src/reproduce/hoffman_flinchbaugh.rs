@@ -3,6 +3,7 @@
 use crate::array::rows_from_numpy;
 use crate::result::result;
 use crate::wait::interruptible;
+use crate::whole::{FROM_0, Whole, WholeNumbers};
 use glam::DVec2;
 use memo_core::reproduce::hoffman_flinchbaugh::{
     self, DEGENERATE, degenerate_refusals, false_targets, hinge_trials, rod_trials,
@@ -60,7 +61,8 @@ result! {
 /// Maximum number of problems; more take hours.
 const MOST_TRIALS: usize = 100_000_000;
 
-fn checked(trials: usize) -> PyResult<usize> {
+fn checked(trials: Whole<usize>) -> PyResult<usize> {
+    let trials = trials.must_be("trials", &format!("between 0 and {MOST_TRIALS}"))?;
     if trials > MOST_TRIALS {
         return Err(PyValueError::new_err(format!("trials must be at most {MOST_TRIALS}, got {trials}")));
     }
@@ -69,8 +71,12 @@ fn checked(trials: usize) -> PyResult<usize> {
 
 /// Proposition 1 on random rods in three views.
 #[pyfunction]
-pub fn hoffman_flinchbaugh_rods(py: Python<'_>, trials: usize, seed: u64) -> PyResult<RodTrials> {
-    let trials = checked(trials)?;
+pub fn hoffman_flinchbaugh_rods(
+    py: Python<'_>,
+    trials: Whole<usize>,
+    seed: Whole<u64>,
+) -> PyResult<RodTrials> {
+    let (trials, seed) = (checked(trials)?, seed.must_be("seed", FROM_0)?);
     RodTrials::of(py, interruptible(py, move || rod_trials(trials, seed))?)
 }
 
@@ -78,18 +84,23 @@ pub fn hoffman_flinchbaugh_rods(py: Python<'_>, trials: usize, seed: u64) -> PyR
 #[pyfunction]
 pub fn hoffman_flinchbaugh_hinges(
     py: Python<'_>,
-    trials: usize,
-    searched: usize,
-    seed: u64,
+    trials: Whole<usize>,
+    searched: Whole<usize>,
+    seed: Whole<u64>,
 ) -> PyResult<HingeTrials> {
-    let trials = checked(trials)?;
+    let (trials, seed) = (checked(trials)?, seed.must_be("seed", FROM_0)?);
+    let searched = searched.must_be("searched", FROM_0)?;
     HingeTrials::of(py, interruptible(py, move || hinge_trials(trials, searched, seed))?)
 }
 
 /// The number of `trials` unrelated pairs in three views, and triples in two, with a planar interpretation.
 #[pyfunction]
-pub fn hoffman_flinchbaugh_false_targets(py: Python<'_>, trials: usize, seed: u64) -> PyResult<[usize; 2]> {
-    let trials = checked(trials)?;
+pub fn hoffman_flinchbaugh_false_targets(
+    py: Python<'_>,
+    trials: Whole<usize>,
+    seed: Whole<u64>,
+) -> PyResult<[usize; 2]> {
+    let (trials, seed) = (checked(trials)?, seed.must_be("seed", FROM_0)?);
     interruptible(py, move || false_targets(trials, seed))
 }
 
@@ -97,10 +108,10 @@ pub fn hoffman_flinchbaugh_false_targets(py: Python<'_>, trials: usize, seed: u6
 #[pyfunction]
 pub fn hoffman_flinchbaugh_degenerate(
     py: Python<'_>,
-    trials: usize,
-    seed: u64,
+    trials: Whole<usize>,
+    seed: Whole<u64>,
 ) -> PyResult<Vec<(&'static str, usize)>> {
-    let trials = checked(trials)?;
+    let (trials, seed) = (checked(trials)?, seed.must_be("seed", FROM_0)?);
     let refused = interruptible(py, move || degenerate_refusals(trials, seed))?;
     Ok(DEGENERATE.into_iter().zip(refused).collect())
 }

@@ -3,6 +3,7 @@
 use crate::array::{numpy_from_column, numpy_from_figures, numpy_from_rows};
 use crate::error::value_error;
 use crate::result::result;
+use crate::whole::{Whole, WholeNumbers};
 use memo_core::model::JOINT_COUNT;
 use memo_core::model::limits::{AngleRange, Limits};
 use memo_core::posture::head::{HeadModel, HeadPoint};
@@ -209,8 +210,9 @@ const MOST_FRAMES: usize = 1_000_000;
 pub fn lee_chen_walker<'py>(
     py: Python<'py>,
     sequence: &str,
-    frames: usize,
+    frames: Whole<usize>,
 ) -> PyResult<(Bound<'py, PyArray3<f64>>, Bound<'py, PyArray1<f64>>)> {
+    let frames = frames.must_be("frames", &format!("between 0 and {MOST_FRAMES}"))?;
     if frames > MOST_FRAMES {
         return Err(PyValueError::new_err(format!("frames must be at most {MOST_FRAMES}, got {frames}")));
     }

@@ -10,6 +10,7 @@ use crate::record::{SegmentsWithParts, segments_with_parts};
 use crate::result::result;
 use crate::wait::pooled;
 use crate::walk::Walk;
+use crate::whole::{FROM_0, Whole, WholeNumbers};
 use glam::{DVec2, DVec3};
 use memo_core::image::{ChangeDetector, ChangeOptions, Outline, Rectangle, outlines};
 use memo_core::model::{GaitStyle, Part, VisibilityOptions, VisibleSegment, visible_contours};
@@ -20,7 +21,7 @@ use memo_core::track::search::{Axis, Grid, Hypothesis, SearchResult, search};
 use memo_core::wording::counted;
 use memo_core::{Body, Gait, Mask, Walker};
 use numpy::{PyArray1, PyArray2, PyArrayDyn};
-use pyo3::exceptions::{PyIndexError, PyValueError};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 result! {
@@ -66,9 +67,10 @@ pub fn rohr_numbers() -> Vec<(&'static str, f64)> {
 
 /// Largest difference of the two sides of each equation, computed in two ways, by name.
 #[pyfunction]
-#[pyo3(signature = (seed=0))]
-pub fn rohr_deviations(py: Python<'_>, seed: u64) -> Vec<(&'static str, f64)> {
-    py.detach(|| rohr::deviations(seed))
+#[pyo3(signature = (seed=Whole::from(0)), text_signature = "(seed=0)")]
+pub fn rohr_deviations(py: Python<'_>, seed: Whole<u64>) -> PyResult<Vec<(&'static str, f64)>> {
+    let seed = seed.must_be("seed", FROM_0)?;
+    Ok(py.detach(|| rohr::deviations(seed)))
 }
 
 fn gait_of(name: &str) -> PyResult<Gait> {
@@ -228,7 +230,7 @@ pub fn walk_filtered<'py>(py: Python<'py>, walk: PyRef<'py, Walk>) -> PyResult<B
 pub fn walk_lines<'py>(
     py: Python<'py>,
     walk: PyRef<'py, Walk>,
-    row: usize,
+    row: Whole<usize>,
     phase: Option<f64>,
 ) -> PyResult<SegmentsWithParts<'py>> {
     let at = hypothesis(&walk, row)?;
@@ -245,7 +247,7 @@ pub fn walk_lines<'py>(
 pub fn walk_similarity(
     py: Python<'_>,
     walk: PyRef<'_, Walk>,
-    row: usize,
+    row: Whole<usize>,
     edges: Vec<Vec<f64>>,
     along_m: f64,
     height_m: f64,
@@ -283,12 +285,11 @@ fn values(axis: &Axis, from: f64) -> Vec<f64> {
     (0..axis.count).map(|i| axis.at(i) - from).collect()
 }
 
-fn hypothesis(walk: &Walk, row: usize) -> PyResult<Hypothesis> {
+fn hypothesis(walk: &Walk, row: Whole<usize>) -> PyResult<Hypothesis> {
     let (tracked, rows) = walk.tracked()?;
     if tracked.fitted().is_some() {
         return Err(PyValueError::new_err("the person was fitted: give a walk of Tracker(adapt=False)"));
     }
-    rows.get(row).map(|row| row.hypothesis).ok_or_else(|| {
-        PyIndexError::new_err(format!("row {row} of a walk with {}", counted(rows.len(), "row")))
-    })
+    let row = row.index(rows.len(), "row", &format!("a walk with {}", counted(rows.len(), "row")))?;
+    Ok(rows[row].hypothesis)
 }
