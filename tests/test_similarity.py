@@ -1,5 +1,7 @@
 """The core's similarity against the plain reference in numpy."""
 
+import inspect
+
 import memo
 import numpy as np
 import pytest
@@ -27,3 +29,13 @@ def test_shapes_are_named_when_wrong():
         memo.similarity(np.zeros((2, 2)), np.zeros((1, 2, 2)))
     with pytest.raises(ValueError, match=r"shape \[3, 4, 2\]"):
         memo.similarity(np.zeros((1, 2, 2)), np.zeros((3, 4, 2)))
+
+
+def test_the_signature_states_the_defaults_of_the_core():
+    parameters = inspect.signature(memo.similarity).parameters
+    usual = memo._memo.defaults("similarity")
+    assert {name: parameters[name].default for name in usual} == pytest.approx(usual, rel=1e-7)
+    lines = np.array([[[0.0, 0.0], [40.0, 0.0]]])
+    edges = np.array([[[1.0, 1.0], [38.0, 3.0]]])
+    assert memo.similarity(lines, edges)[0] == memo.similarity(lines, edges, **usual)[0] > 0
+    assert "`sigma_phi_rad` is 12 degrees by default" in " ".join(memo.similarity.__doc__.split())

@@ -766,10 +766,10 @@ def similarity(
     lines: npt.NDArray[np.float64],
     edges: npt.NDArray[np.float64],
     *,
-    c_l: float = ...,
-    c_d: float = ...,
-    c_r: float = ...,
-    sigma_phi_rad: float = ...,
+    c_l: float = 1.0,
+    c_d: float = 0.5,
+    c_r: float = 0.25,
+    sigma_phi_rad: float = 0.20943952,
 ) -> tuple[float, npt.NDArray[np.float64]]: ...
 def shrunk(frame: npt.NDArray[np.uint8], n: int) -> npt.NDArray[np.uint8]: ...
 def edge_segments(

@@ -1,6 +1,6 @@
 //! The defaults of the core's options, for help and documentation.
 
-use crate::{image, planar, pointlight, posture, tracker, walk};
+use crate::{image, planar, pointlight, posture, score, tracker, walk};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -26,6 +26,7 @@ pub fn defaults<'py>(py: Python<'py>, function: &str) -> PyResult<Bound<'py, PyD
         "pointlight_frames" => pointlight::picture_defaults(py),
         "posture" => posture::defaults(py),
         "track" => tracker::defaults(py),
+        "similarity" => score::defaults(py),
         "silhouettes" => image::silhouette_defaults(py),
         "walker_motion" => pointlight::walker_defaults(py),
         _ => Err(PyValueError::new_err(format!("no defaults of a function {function:?}"))),

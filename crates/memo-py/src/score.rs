@@ -1,17 +1,19 @@
 //! Similarity of model contours and image edges.
 
 use crate::array::{numpy_from_rows, segments_from_numpy};
+use crate::defaults::dict;
 use crate::error::value_error;
 use memo_core::track::score::{EdgeLine, ModelLine, SimilarityOptions, similarity as core_similarity};
 use numpy::PyArray2;
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 
 /// Similarity (eqs. 7 and 11) of model lines (N, 2, 2) and edges (M, 2, 2) in pixels: the value, and for each
-/// matched line a row of line, edge, overlap l, distance d, angle (radians), s_i.
+/// matched line a row of line, edge, overlap l, distance d, angle (radians), s_i. The angle's standard deviation
+/// `sigma_phi_rad` is 12 degrees by default.
 #[pyfunction]
 #[pyo3(signature = (
-    lines, edges, *, c_l=SimilarityOptions::DEFAULT.c_l, c_d=SimilarityOptions::DEFAULT.c_d,
-    c_r=SimilarityOptions::DEFAULT.c_r, sigma_phi_rad=SimilarityOptions::DEFAULT.sigma_phi_rad
+    lines, edges, *, c_l=1.0, c_d=0.5, c_r=0.25, sigma_phi_rad=0.20943952
 ))]
 pub fn similarity<'py>(
     py: Python<'py>,
@@ -44,4 +46,9 @@ pub fn similarity<'py>(
         ]
     };
     Ok((found.value, numpy_from_rows(py, found.matches.iter().map(row).collect())?))
+}
+
+pub fn defaults(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
+    let SimilarityOptions { c_l, c_d, c_r, sigma_phi_rad, .. } = SimilarityOptions::DEFAULT;
+    dict!(py, { c_l: c_l, c_d: c_d, c_r: c_r, sigma_phi_rad: sigma_phi_rad, })
 }
