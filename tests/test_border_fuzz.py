@@ -172,6 +172,13 @@ def test_a_figure_of_no_size_is_refused():
         memo.planar(points, np.arange(30) / 25, 1.0, size_px=5e-324)
 
 
+@pytest.mark.parametrize("focal_px", [-500.0, 0.0, np.nan, np.inf])
+def test_a_focal_length_that_no_camera_has_is_refused(focal_px):
+    points = np.random.default_rng(0).random((30, 3, 2))
+    with pytest.raises(ValueError, match=r"^focal_px must be positive and finite, got "):
+        memo.planar(points, np.arange(30) / 25, 1.0, focal_px=focal_px)
+
+
 @pytest.mark.parametrize("size", [(16, 12), (180, 144), (240, 180)])
 def test_small_pictures_are_calibrated(size):
     camera = memo.Camera.level(size, 45.0, 1.5, 5.0)

@@ -175,6 +175,9 @@ pub fn planar(
     focal_px: Option<f64>,
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<PlanarInterpretation> {
+    if let Some(got) = focal_px.filter(|&px| !(px > 0.0 && px.is_finite())) {
+        return Err(PyValueError::new_err(format!("focal_px must be positive and finite, got {got}")));
+    }
     let (points, frames, count) = motion_from_numpy::<2>(tracks)?;
     let usual = FigureOptions::default();
     let options = FigureOptions {
