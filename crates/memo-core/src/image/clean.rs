@@ -37,9 +37,10 @@ impl Default for CleanOptions {
 }
 
 impl CleanOptions {
-    /// Refuses thresholds with which the recursion could run for ever.
+    /// Refuses thresholds with which the recursion could run for ever, and numbers of neighbours that no pixel has.
     pub fn check(&self) -> Result<(), OptionError> {
-        OptionError::unless(self.few < self.many, "few", "less than many", f64::from(self.few))
+        OptionError::unless(self.few < self.many, "few", "less than many", f64::from(self.few))?;
+        OptionError::unless(self.many <= 9, "many", "at most 9", f64::from(self.many))
     }
 }
 
@@ -293,6 +294,17 @@ mod tests {
         let mask = mask_of(&["#"]);
         let error = clean(&mask, &CleanOptions { few: 4, many: 4 }).unwrap_err();
         assert_eq!(error, OptionError { name: "few", wanted: "less than many", got: 4.0 });
+    }
+
+    /// Larger numbers would count the rim around the mask among the marked pixels.
+    #[test]
+    fn more_neighbours_than_eight_are_refused() {
+        let mask = mask_of(&["##", "##"]);
+        for (few, many) in [(2, 10), (112, 113), (240, 241), (254, 255)] {
+            let error = clean(&mask, &CleanOptions { few, many }).unwrap_err();
+            assert_eq!(error, OptionError { name: "many", wanted: "at most 9", got: f64::from(many) });
+        }
+        assert_eq!(clean(&mask, &CleanOptions { few: 8, many: 9 }).unwrap(), Image::filled(2, 2, false));
     }
 
     /// Pixels with up to two of eight neighbours are deleted: lines of one pixel from end to end, and spurs.
