@@ -65,8 +65,21 @@ pub type Mask = Image<bool>;
 
 impl<T: Copy> Image<T> {
     /// An image filled with one value.
+    ///
+    /// # Panics
+    ///
+    /// If a side is zero, or there are more pixels than memory can hold.
     pub fn filled(width: usize, height: usize, value: T) -> Self {
-        Self { width, height, data: vec![value; width * height] }
+        assert!(width > 0 && height > 0, "an image of {width}x{height} pixels: sides must be positive");
+        Self::perhaps_empty(width, height, value)
+    }
+
+    /// The same, but without pixels if a side is zero: what a window outside an image shows of it.
+    pub(crate) fn perhaps_empty(width: usize, height: usize, value: T) -> Self {
+        let Some(count) = width.checked_mul(height) else {
+            panic!("an image of {width}x{height} pixels: more than memory can hold")
+        };
+        Self { width, height, data: vec![value; count] }
     }
 
     /// Takes row-major data of `width * height` elements.
@@ -285,6 +298,13 @@ impl Between {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn images_have_pixels() {
+        let filled = |width, height| std::panic::catch_unwind(|| Image::filled(width, height, 0u8)).is_ok();
+        assert!(filled(1, 3));
+        assert!(![(0, 0), (0, 3), (3, 0), (1 << 32, 1 << 32)].into_iter().any(|(w, h)| filled(w, h)));
+    }
 
     #[test]
     fn padded_rows_are_read_in_place() {

@@ -78,9 +78,9 @@ impl SurfaceMap {
         let Window { width, height, .. } = window;
         Self {
             window,
-            depth_m: Image::filled(width, height, f32::INFINITY),
-            part: Image::filled(width, height, NO_PART),
-            normal: Image::filled(width, height, [0.0; 3]),
+            depth_m: Image::perhaps_empty(width, height, f32::INFINITY),
+            part: Image::perhaps_empty(width, height, NO_PART),
+            normal: Image::perhaps_empty(width, height, [0.0; 3]),
         }
     }
 
