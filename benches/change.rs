@@ -47,7 +47,7 @@ fn background(c: &mut Criterion) {
     for (width, height) in SIZES {
         let size = format!("{width}x{height}");
         let (a, b) = (frame(width, height, width / 3, 1), frame(width, height, width / 2, 2));
-        let mut background = Background::new(&a.as_frame(), BackgroundOptions::default());
+        let mut background = Background::new(&a.as_frame(), BackgroundOptions::default()).expect("valid");
         let mask = background.foreground(&b.as_frame()).expect("same size");
         group.throughput(Throughput::Elements((width * height) as u64));
         group.bench_function(BenchmarkId::new("update", &size), |bench| {

@@ -55,7 +55,9 @@ pub fn moving_regions<'py>(py: Python<'py>, mask: &Bound<'py, PyAny>) -> PyResul
     let mask = mask_from_numpy(mask)?;
     let group = GroupOptions::default();
     let cleaned = py.detach(|| clean(&mask, &CleanOptions::default())).map_err(value_error)?;
-    let found = py.detach(|| group_regions(&regions(&fill_holes(&cleaned), group.min_part_area), &group));
+    let found = py
+        .detach(|| group_regions(&regions(&fill_holes(&cleaned), group.min_part_area), &group))
+        .map_err(value_error)?;
     let row = |r: &memo_core::image::Region| {
         let q = r.rectangle;
         [q.left, q.top, q.right, q.bottom, r.area].map(|v| v as f64)

@@ -10,7 +10,7 @@
 //!
 //! Limits: whatever covers a pixel most of the time counts as background, and the camera must be static.
 
-use super::change::{ChangeOptions, pair_changes};
+use super::change::{ChangeOptions, changes_between};
 use super::clean::fill_holes;
 use super::frame::{Frame, FrameError, Image, Mask};
 use crate::OptionError;
@@ -41,14 +41,15 @@ impl Default for BackgroundOptions {
 impl BackgroundOptions {
     /// Refuses options outside their ranges.
     pub fn check(&self) -> Result<(), OptionError> {
-        OptionError::unless_positive("rate", self.rate)?;
+        let is_followed = (1.0 / f64::from(LEVELS)..=128.0).contains(&self.rate);
+        OptionError::unless(is_followed, "rate", "1/256 to 128 grey levels per frame", self.rate)?;
         OptionError::unless_positive("first_step", self.first_step)?;
         self.change.check()
     }
 }
 
 /// Why no background was computed.
-#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum BackgroundError {
     /// No frame was given.
@@ -57,6 +58,9 @@ pub enum BackgroundError {
     /// The frames differ in size.
     #[error(transparent)]
     Frame(#[from] FrameError),
+    /// An option is outside its range.
+    #[error(transparent)]
+    Option(#[from] OptionError),
 }
 
 /// Steps of the stored level in one grey level.
@@ -73,7 +77,11 @@ pub struct Background {
 
 impl Background {
     /// Starts from one frame.
-    pub fn new(first: &Frame, options: BackgroundOptions) -> Self {
+    ///
+    /// # Errors
+    ///
+    /// An option is outside its range.
+    pub fn new(first: &Frame, options: BackgroundOptions) -> Result<Self, OptionError> {
         Self::from_image(&first.to_image(), 1, options)
     }
 
@@ -82,7 +90,7 @@ impl Background {
     ///
     /// # Errors
     ///
-    /// There are no frames, or they differ in size.
+    /// There are no frames, they differ in size, or an option is outside its range.
     pub fn from_frames(frames: &[Frame], options: BackgroundOptions) -> Result<Self, BackgroundError> {
         let first = frames.first().ok_or(BackgroundError::NoFrames)?;
         frames.iter().try_for_each(|frame| first.check_same_size(frame))?;
@@ -91,15 +99,16 @@ impl Background {
             let rows: Vec<&[u8]> = frames.iter().map(|frame| frame.row(y)).collect();
             median_row(&rows, median.row_mut(y));
         }
-        Ok(Self::from_image(&median, frames.len(), options))
+        Ok(Self::from_image(&median, frames.len(), options)?)
     }
 
-    fn from_image(image: &Image<u8>, frames: usize, options: BackgroundOptions) -> Self {
+    fn from_image(image: &Image<u8>, frames: usize, options: BackgroundOptions) -> Result<Self, OptionError> {
+        options.check()?;
         let mut level = Image::filled(image.width(), image.height(), 0u16);
         for (level, &grey) in level.pixels_mut().iter_mut().zip(image.pixels()) {
             *level = u16::from(grey) * LEVELS as u16;
         }
-        Self { options, level, frames }
+        Ok(Self { options, level, frames })
     }
 
     /// The background rounded to grey values.
@@ -134,7 +143,7 @@ impl Background {
     ///
     /// The frame differs in size from the background.
     pub fn foreground(&self, frame: &Frame) -> Result<Mask, FrameError> {
-        pair_changes(&self.image().as_frame(), frame, &self.options.change)
+        changes_between(&self.image().as_frame(), frame, &self.options.change)
     }
 
     /// The pixels of `within` whose grey value differs from the background by more than `threshold` grey
@@ -301,7 +310,8 @@ mod tests {
 
     #[test]
     fn the_first_frame_s_person_fades_when_gone() {
-        let mut background = Background::new(&scene(Some(20)).as_frame(), BackgroundOptions::default());
+        let mut background =
+            Background::new(&scene(Some(20)).as_frame(), BackgroundOptions::default()).unwrap();
         for i in 0..40 {
             background.update(&scene((i < 20).then_some(22 + i)).as_frame(), None).unwrap();
         }
@@ -326,7 +336,7 @@ mod tests {
 
     #[test]
     fn a_silhouette_ends_at_the_edge_where_the_change_mask_does_not() {
-        let background = Background::new(&scene(None).as_frame(), BackgroundOptions::default());
+        let background = Background::new(&scene(None).as_frame(), BackgroundOptions::default()).unwrap();
         let frame = scene(Some(20));
         let foreground = background.foreground(&frame.as_frame()).unwrap();
         let silhouette = background.silhouette(&frame.as_frame(), &foreground, 40.0).unwrap();
@@ -341,7 +351,7 @@ mod tests {
     #[test]
     fn slow_drift_is_followed() {
         let options = BackgroundOptions { rate: 0.1, first_step: 1.0, ..BackgroundOptions::default() };
-        let mut background = Background::new(&Image::filled(8, 8, 100u8).as_frame(), options);
+        let mut background = Background::new(&Image::filled(8, 8, 100u8).as_frame(), options).unwrap();
         for i in 0..400 {
             background.update(&Image::filled(8, 8, 100 + (i / 20) as u8).as_frame(), None).unwrap();
         }
@@ -349,10 +359,32 @@ mod tests {
     }
 
     #[test]
+    fn options_outside_their_ranges_are_refused() {
+        let frame = Image::filled(8, 8, 0u8);
+        let usual = BackgroundOptions::default();
+        let change = ChangeOptions { threshold: Some(f64::NAN), ..usual.change };
+        for (name, options) in [
+            ("rate", BackgroundOptions { rate: f64::NAN, ..usual }),
+            ("rate", BackgroundOptions { rate: 0.001, ..usual }),
+            ("rate", BackgroundOptions { rate: 129.0, ..usual }),
+            ("first_step", BackgroundOptions { first_step: 0.0, ..usual }),
+            ("threshold", BackgroundOptions { change, ..usual }),
+        ] {
+            let refused = |error: &OptionError| error.name == name;
+            assert!(
+                Background::new(&frame.as_frame(), options).is_err_and(|error| refused(&error)),
+                "{name}"
+            );
+            let error = Background::from_frames(&[frame.as_frame()], options).unwrap_err();
+            assert!(matches!(error, BackgroundError::Option(error) if refused(&error)), "{name}");
+        }
+    }
+
+    #[test]
     fn no_frames_and_other_sizes_are_refused() {
         let options = BackgroundOptions::default();
         assert_eq!(Background::from_frames(&[], options).unwrap_err(), BackgroundError::NoFrames);
-        let mut background = Background::new(&Image::filled(8, 8, 0u8).as_frame(), options);
+        let mut background = Background::new(&Image::filled(8, 8, 0u8).as_frame(), options).unwrap();
         assert!(background.update(&Image::filled(8, 9, 0u8).as_frame(), None).is_err());
         let mask = Image::filled(7, 8, false);
         assert!(background.update(&Image::filled(8, 8, 0u8).as_frame(), Some(&mask)).is_err());
@@ -362,7 +394,7 @@ mod tests {
     #[test]
     fn a_silhouette_is_filled() {
         let background =
-            Background::new(&Image::filled(40, 40, 100u8).as_frame(), BackgroundOptions::default());
+            Background::new(&Image::filled(40, 40, 100u8).as_frame(), BackgroundOptions::default()).unwrap();
         let mut frame = Image::filled(40, 40, 100u8);
         (10..30).for_each(|y| frame.row_mut(y)[10..30].fill(200));
         (16..24).for_each(|y| frame.row_mut(y)[16..24].fill(100));
@@ -377,7 +409,7 @@ mod tests {
     #[test]
     fn an_old_background_follows_slowly() {
         let mut background =
-            Background::new(&Image::filled(8, 8, 100u8).as_frame(), BackgroundOptions::default());
+            Background::new(&Image::filled(8, 8, 100u8).as_frame(), BackgroundOptions::default()).unwrap();
         background.frames = 1_000_000;
         let brighter = Image::filled(8, 8, 140u8);
         for frame in 1..=100 {
@@ -386,7 +418,8 @@ mod tests {
             let level = 100.0 + f64::from(frame) * 13.0 / 256.0;
             assert_eq!(background.image().at(3, 3), level.round() as u8, "{frame}");
         }
-        let still = Background::new(&Image::filled(40, 40, 100u8).as_frame(), BackgroundOptions::default());
+        let still =
+            Background::new(&Image::filled(40, 40, 100u8).as_frame(), BackgroundOptions::default()).unwrap();
         for (by, is_changed) in [(8, false), (9, true)] {
             let mut frame = Image::filled(40, 40, 100u8);
             (5..15).for_each(|y| frame.row_mut(y)[5..15].fill(100 + by));

@@ -24,6 +24,7 @@ use super::fit::{BORDER, NORM_SCALE, WINDOW, for_each_window, window_norm};
 use super::frame::{Frame, FrameError, Image, Mask};
 use super::gain::estimate_gain;
 use crate::OptionError;
+use thiserror::Error;
 
 /// How far beyond the visible edge of a moving object eq. (1) marks pixels, in pixels: a window reaches the
 /// edge from two pixels away.
@@ -36,6 +37,18 @@ pub const CHANGE_REACH_PX: f64 = 2.3;
 
 /// Median of the chi-square distribution with six degrees of freedom.
 const CHI_SQ_6_MEDIAN: f64 = 5.348_120_627;
+
+/// Why two frames were not compared.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum ChangeError {
+    /// The frames differ in size.
+    #[error(transparent)]
+    Frame(#[from] FrameError),
+    /// An option is outside its range.
+    #[error(transparent)]
+    Option(#[from] OptionError),
+}
 
 /// Options for comparing two frames.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -80,15 +93,21 @@ impl ChangeOptions {
 ///
 /// # Errors
 ///
-/// The frames differ in size.
-pub fn pair_changes(a: &Frame, b: &Frame, options: &ChangeOptions) -> Result<Mask, FrameError> {
+/// The frames differ in size, or an option is outside its range.
+pub fn pair_changes(a: &Frame, b: &Frame, options: &ChangeOptions) -> Result<Mask, ChangeError> {
+    options.check()?;
+    Ok(changes_between(a, b, options)?)
+}
+
+/// [`pair_changes`] by options that were checked.
+pub(super) fn changes_between(a: &Frame, b: &Frame, options: &ChangeOptions) -> Result<Mask, FrameError> {
     a.check_same_size(b)?;
     if !options.compensate_gain {
-        return Ok(changes_over(a, b, pair_threshold(a, b, options)?));
+        return Ok(changes_over(a, b, threshold_of(a, b, options)?));
     }
     let matched = estimate_gain(a, b)?.apply(b);
     let matched = matched.as_frame();
-    Ok(changes_over(a, &matched, pair_threshold(a, &matched, options)?))
+    Ok(changes_over(a, &matched, threshold_of(a, &matched, options)?))
 }
 
 /// The left side of eq. (1), N in grey levels, for every pixel.
@@ -110,8 +129,13 @@ pub fn fit_norms(a: &Frame, b: &Frame) -> Result<Image<f32>, FrameError> {
 ///
 /// # Errors
 ///
-/// The frames differ in size.
-pub fn pair_threshold(a: &Frame, b: &Frame, options: &ChangeOptions) -> Result<f64, FrameError> {
+/// The frames differ in size, or an option is outside its range.
+pub fn pair_threshold(a: &Frame, b: &Frame, options: &ChangeOptions) -> Result<f64, ChangeError> {
+    options.check()?;
+    Ok(threshold_of(a, b, options)?)
+}
+
+fn threshold_of(a: &Frame, b: &Frame, options: &ChangeOptions) -> Result<f64, FrameError> {
     a.check_same_size(b)?;
     match options.threshold {
         Some(threshold) => Ok(threshold),
@@ -220,8 +244,13 @@ pub struct ChangeDetector {
 
 impl ChangeDetector {
     /// A detector before its first frame.
-    pub fn new(options: ChangeOptions) -> Self {
-        Self { options, previous: None, previous_pair: None }
+    ///
+    /// # Errors
+    ///
+    /// An option is outside its range.
+    pub fn new(options: ChangeOptions) -> Result<Self, OptionError> {
+        options.check()?;
+        Ok(Self { options, previous: None, previous_pair: None })
     }
 
     /// Takes the next frame and returns the mask of the previous one, `None` for the first frame. A frame of
@@ -231,7 +260,7 @@ impl ChangeDetector {
             self.previous = Some(frame.to_image());
             return Ok(None);
         };
-        let pair = pair_changes(&previous.as_frame(), frame, &self.options)?;
+        let pair = changes_between(&previous.as_frame(), frame, &self.options)?;
         let mut mask = pair.clone();
         if let Some(before) = &self.previous_pair {
             unite(&mut mask, before);
@@ -414,9 +443,28 @@ mod tests {
     fn frames_of_unequal_size_are_refused() {
         let (a, b) = (Image::filled(9, 9, 0u8), Image::filled(9, 8, 0u8));
         let error = pair_changes(&a.as_frame(), &b.as_frame(), &ChangeOptions::default()).unwrap_err();
+        let ChangeError::Frame(error) = error else { panic!("{error}") };
         assert!(matches!(error, FrameError::SizeChanged { height: 8, expected_height: 9, .. }));
         assert_eq!(noise_sd(&a.as_frame(), &b.as_frame()), Err(error.clone()));
         assert_eq!(fit_norms(&a.as_frame(), &b.as_frame()), Err(error));
+    }
+
+    #[test]
+    fn options_outside_their_ranges_are_refused() {
+        let frame = Image::filled(9, 9, 0u8);
+        let frame = frame.as_frame();
+        let usual = ChangeOptions::default();
+        for (name, options) in [
+            ("threshold", fixed(f64::NAN)),
+            ("false_rate", ChangeOptions { false_rate: 0.0, ..usual }),
+            ("min_threshold", ChangeOptions { min_threshold: -1.0, ..usual }),
+        ] {
+            let refused =
+                |error: ChangeError| matches!(error, ChangeError::Option(error) if error.name == name);
+            assert!(pair_changes(&frame, &frame, &options).is_err_and(refused), "{name}");
+            assert!(pair_threshold(&frame, &frame, &options).is_err_and(refused), "{name}");
+            assert!(ChangeDetector::new(options).is_err_and(|error| error.name == name), "{name}");
+        }
     }
 
     #[test]
@@ -424,7 +472,7 @@ mod tests {
         let at = |left: usize| image(40, 9, move |x, _| if (left..left + 3).contains(&x) { 200 } else { 50 });
         let frames = [at(5), at(15), at(25), at(25)];
         let options = ChangeOptions::default();
-        let mut detector = ChangeDetector::new(options);
+        let mut detector = ChangeDetector::new(options).unwrap();
         let mut masks: Vec<_> =
             frames.iter().filter_map(|frame| detector.push(&frame.as_frame()).unwrap()).collect();
         masks.extend(detector.finish());

@@ -22,8 +22,8 @@ pub(crate) mod silhouette;
 pub use background::{Background, BackgroundError, BackgroundOptions};
 pub(crate) use change::unite;
 pub use change::{
-    CHANGE_REACH_PX, ChangeDetector, ChangeOptions, fit_norms, noise_sd, pair_changes, pair_threshold,
-    threshold_for_noise,
+    CHANGE_REACH_PX, ChangeDetector, ChangeError, ChangeOptions, fit_norms, noise_sd, pair_changes,
+    pair_threshold, threshold_for_noise,
 };
 pub use clean::{CleanOptions, clean, dilate, fill_holes};
 pub use edge::{EdgeChains, EdgeDomain, EdgeError, EdgeOptions, Edgel, Window, edge_chains};

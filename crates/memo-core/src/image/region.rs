@@ -225,11 +225,20 @@ impl GroupOptions {
 ///
 /// The largest region takes in the areas that are near enough, largest first, until none is left; then the
 /// largest remaining region does the same, and so on.
-pub fn group_regions(regions: &[Region], options: &GroupOptions) -> Vec<Region> {
-    group_regions_of(regions, options, |_| true)
+///
+/// # Errors
+///
+/// An option is outside its range.
+///
+/// # Panics
+///
+/// If a run of a region ends before it starts.
+pub fn group_regions(regions: &[Region], options: &GroupOptions) -> Result<Vec<Region>, OptionError> {
+    options.check()?;
+    Ok(group_regions_of(regions, options, |_| true))
 }
 
-/// The same, but no group takes in an area with which its rectangle cannot be that of one object.
+/// The same by options that were checked, but no group takes in an area with which its rectangle cannot be that of one object.
 pub(crate) fn group_regions_of(
     regions: &[Region],
     options: &GroupOptions,
@@ -369,7 +378,7 @@ pub(super) mod tests {
     #[test]
     fn a_row_of_things_is_no_person() {
         let row: Vec<Region> = (0..8).map(|i| block(40 + 32 * i, 90, 30, 14)).collect();
-        assert_eq!(group_regions(&row, &GroupOptions::default()), row);
+        assert_eq!(group_regions(&row, &GroupOptions::default()).unwrap(), row);
     }
 
     /// A frame of 110 grey levels with a disc of radius 20 around (x, y); the pixels on its border are
@@ -397,7 +406,8 @@ pub(super) mod tests {
                 let found = group_regions(
                     &regions(&mask, 1),
                     &GroupOptions { max_aspect: 2.0, gap_x: 1.0, ..GroupOptions::default() },
-                );
+                )
+                .unwrap();
                 let sides = found[0].rectangle.sides(CHANGE_REACH_PX);
                 assert!((sides.top - (y - 20.0)).abs() < tolerance, "{contrast} {y} {sides:?}");
                 assert!((sides.bottom - (y + 20.0)).abs() < tolerance, "{contrast} {y} {sides:?}");
@@ -416,7 +426,8 @@ pub(super) mod tests {
         let trunk = block(100, 50, 30, 60);
         let (shoe, neighbour, speck) = (block(95, 125, 12, 8), block(140, 50, 30, 80), block(131, 60, 3, 3));
         let groups =
-            group_regions(&[trunk.clone(), shoe.clone(), neighbour.clone(), speck], &GroupOptions::default());
+            group_regions(&[trunk.clone(), shoe.clone(), neighbour.clone(), speck], &GroupOptions::default())
+                .unwrap();
         assert_eq!(groups.len(), 2);
         assert_eq!(groups[0], neighbour);
         assert_eq!(groups[1].rectangle, trunk.rectangle.union(&shoe.rectangle));
@@ -427,7 +438,7 @@ pub(super) mod tests {
     fn areas_that_cannot_be_one_object_stay_apart() {
         let (near, far) = (block(100, 100, 30, 80), block(105, 30, 28, 65));
         let parts = [near.clone(), far.clone()];
-        assert_eq!(group_regions(&parts, &GroupOptions::default()).len(), 1);
+        assert_eq!(group_regions(&parts, &GroupOptions::default()).unwrap().len(), 1);
         let is_low = |whole: &Rectangle| whole.height() <= 100;
         assert_eq!(group_regions_of(&parts, &GroupOptions::default(), is_low), [near.clone(), far]);
         // What is inside a group's rectangle makes it no taller: here between the bars of an L.
@@ -441,10 +452,10 @@ pub(super) mod tests {
     fn grouping_does_not_depend_on_the_order() {
         let parts =
             [block(100, 50, 30, 60), block(95, 125, 12, 20), block(120, 160, 12, 20), block(300, 0, 20, 40)];
-        let groups = group_regions(&parts, &GroupOptions::default());
+        let groups = group_regions(&parts, &GroupOptions::default()).unwrap();
         let mut reversed = parts;
         reversed.reverse();
-        assert_eq!(groups, group_regions(&reversed, &GroupOptions::default()));
+        assert_eq!(groups, group_regions(&reversed, &GroupOptions::default()).unwrap());
         assert_eq!(groups.iter().map(|group| group.rectangle.height()).collect::<Vec<_>>(), [130, 40]);
     }
 
@@ -456,7 +467,7 @@ pub(super) mod tests {
     }
 
     fn group_sizes(parts: &[Region]) -> Vec<usize> {
-        let areas = group_regions(parts, &GroupOptions::default());
+        let areas = group_regions(parts, &GroupOptions::default()).unwrap();
         areas.iter().map(|group| group.area).collect()
     }
 

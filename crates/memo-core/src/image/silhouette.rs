@@ -56,7 +56,7 @@ pub fn silhouettes(frames: &[Frame<'_>], threshold: f64) -> Result<Vec<Mask>, Si
 fn silhouette(frame: &Frame<'_>, background: &Background, threshold: f64) -> Result<Mask, SilhouetteError> {
     let changed = fill_holes(&clean(&background.foreground(frame)?, &CleanOptions::default())?);
     let group = GroupOptions::default();
-    let candidates = group_regions(&regions(&changed, group.min_part_area), &group);
+    let candidates = group_regions(&regions(&changed, group.min_part_area), &group)?;
     let within = match candidates.first() {
         Some(region) => region.mask(frame.width(), frame.height()),
         None => Mask::filled(frame.width(), frame.height(), false),

@@ -15,9 +15,9 @@ use crate::image::edge::{EdgeChains, EdgeDomain, EdgeOptions, Window, edge_chain
 use crate::image::flow::{FlowField, FlowOptions, velocity_field};
 use crate::image::line::{EdgeSegment, LineError, LineOptions, segments_from_chains};
 use crate::image::{
-    Background, BackgroundOptions, ChangeOptions, CleanOptions, Frame, FrameError, GroupOptions, Image,
-    LightReport, Mask, Rectangle, Region, SteadyLight, clean, dilate, fill_holes, group_regions,
-    group_regions_of, pair_changes, regions, unite,
+    Background, BackgroundOptions, ChangeError, ChangeOptions, CleanOptions, Frame, FrameError, GroupOptions,
+    Image, LightReport, Mask, Rectangle, Region, SteadyLight, clean, dilate, fill_holes, group_regions_of,
+    pair_changes, regions, unite,
 };
 use crate::model::Camera;
 use glam::DVec2;
@@ -51,6 +51,15 @@ pub enum EvidenceError {
         /// Time of this frame, seconds.
         time_s: f64,
     },
+}
+
+impl From<ChangeError> for EvidenceError {
+    fn from(error: ChangeError) -> Self {
+        match error {
+            ChangeError::Frame(error) => Self::Frame(error),
+            ChangeError::Option(error) => Self::Option(error),
+        }
+    }
 }
 
 /// Options of the stages from pixels to regions and edges.
@@ -169,8 +178,9 @@ impl Evidence {
 
     /// The rectangle of all changes at one of the firm ones. It reaches down to feet that hardly move.
     pub(crate) fn all_changes(&self, firm: &Rectangle, options: &EvidenceOptions) -> Option<Rectangle> {
-        let regions = group_regions(&regions(&self.mask, options.group.min_part_area), &options.group);
-        regions.into_iter().map(|region| region.rectangle).find(|all| all.gap(firm) == [0, 0])
+        let parts = regions(&self.mask, options.group.min_part_area);
+        let found = group_regions_of(&parts, &options.group, |_| true);
+        found.into_iter().map(|region| region.rectangle).find(|all| all.gap(firm) == [0, 0])
     }
 
     /// Straight edges in and near the changed pixels of a rectangle, with their edge points. If nothing changed
@@ -374,7 +384,7 @@ impl EvidenceStream {
         let count = self.waiting.partition_point(is_compared);
         let count = count.max((self.waiting.len() + 1).saturating_sub(MOST_WAITING));
         // 2. Their changes since their earlier neighbours and up to this one.
-        let changes = |waiting: &Waiting| -> Result<[Mask; 2], FrameError> {
+        let changes = |waiting: &Waiting| -> Result<[Mask; 2], ChangeError> {
             let [low, firm] = change_options(&self.options);
             let grey = waiting.grey.as_frame();
             Ok([pair_changes(&grey, frame, &low)?, pair_changes(&grey, frame, &firm)?])
@@ -453,7 +463,10 @@ impl EvidenceStream {
         firm: &mut Mask,
     ) -> Result<(), EvidenceError> {
         let Some(options) = self.options.background else { return Ok(()) };
-        let background = self.background.get_or_insert_with(|| Background::new(&grey.as_frame(), options));
+        let background = match &mut self.background {
+            Some(background) => background,
+            none => none.insert(Background::new(&grey.as_frame(), options)?),
+        };
         let foreground = background.foreground(&grey.as_frame())?;
         for mask in [&mut *low, firm] {
             mask.pixels_mut().iter_mut().zip(foreground.pixels()).for_each(|(pixel, new)| *pixel |= new);

@@ -173,7 +173,8 @@ pub fn image_stages(
     let [before, frame, after] = [arrays[0].as_frame()?, arrays[1].as_frame()?, arrays[2].as_frame()?];
     let options = EvidenceOptions::default();
     let firm = ChangeOptions { min_threshold: options.rectangle_threshold, ..options.change };
-    let (mut detector, mut stream) = (ChangeDetector::new(firm), EvidenceStream::new(options));
+    let (mut detector, mut stream) =
+        (ChangeDetector::new(firm).map_err(value_error)?, EvidenceStream::new(options));
     let (mut changed, mut evidence) = (None, None);
     for (index, frame) in [before, frame, after].iter().enumerate() {
         changed = detector.push(frame).map_err(value_error)?;
