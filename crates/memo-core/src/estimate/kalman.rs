@@ -136,7 +136,13 @@ impl ConstantVelocity {
 /// ones included.
 ///
 /// `filtered[k]` is the state after frame k; `dt_s[k]` is the time from frame k to k + 1, seconds.
+///
+/// # Panics
+///
+/// If there are fewer times than pairs of successive states.
 pub fn smooth(filtered: &[ConstantVelocity], dt_s: &[f64], noise: &Noise) -> Vec<ConstantVelocity> {
+    let [steps, times] = [filtered.len().saturating_sub(1), dt_s.len()];
+    assert!(times >= steps, "{steps} steps need as many times, got {times}");
     let mut smoothed = filtered.to_vec();
     for k in (0..filtered.len().saturating_sub(1)).rev() {
         smoothed[k] = smooth_step(&filtered[k], &smoothed[k + 1], dt_s[k], noise);

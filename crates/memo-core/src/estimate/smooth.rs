@@ -85,7 +85,13 @@ pub fn filter_step(
 
 /// Smooths a track. `acceleration_sd` in units/s². Between and after measurements the value is the expected
 /// motion, with growing uncertainty; before the first measurement it is NaN.
+///
+/// # Panics
+///
+/// If there are fewer times than measurements.
 pub fn smooth_track(times_s: &[f64], measured: &[Measured], acceleration_sd: f64) -> Vec<Measured> {
+    let [times, count] = [times_s.len(), measured.len()];
+    assert!(times >= count, "{count} measurements need as many times, got {times}");
     let first = measured.iter().position(|m| m.value.is_finite()).unwrap_or(measured.len());
     let steps: Vec<f64> = times_s[first..].windows(2).map(|pair| pair[1] - pair[0]).collect();
     let mut filter = None;
@@ -128,6 +134,12 @@ mod tests {
         let stated = smoothed.iter().map(|s| s.sd).sum::<f64>() / 400.0;
         assert!(rms < 0.018, "{rms}");
         assert!((rms / stated - 1.0).abs() < 0.25, "measured {rms}, stated {stated}");
+    }
+
+    #[test]
+    #[should_panic(expected = "3 measurements need as many times, got 2")]
+    fn measurements_without_a_time_are_refused() {
+        smooth_track(&[0.0, 0.1], &[Measured::NOTHING; 3], 1.0);
     }
 
     #[test]

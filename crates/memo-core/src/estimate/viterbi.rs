@@ -8,6 +8,10 @@
 ///
 /// `unary(t, s)` and `ternary(t, s_{t-2}, s_{t-1}, s_t)`, t >= 2, must not be NaN. Of states with equal cost
 /// the lower one wins.
+///
+/// # Panics
+///
+/// If one of several frames has no state.
 pub fn least_path(
     counts: &[usize],
     unary: impl Fn(usize, usize) -> f64,
@@ -17,6 +21,7 @@ pub fn least_path(
     if frames < 2 {
         return counts.iter().map(|&n| argmin((0..n).map(|s| unary(0, s)))).collect();
     }
+    assert!(counts.iter().all(|&n| n > 0), "each frame must have a state, got {counts:?}");
     // Cost of the best path that ends in states i, j of frames t-1, t; index i * n_t + j.
     let mut costs: Vec<f64> = (0..counts[0])
         .flat_map(|i| (0..counts[1]).map(move |j| [i, j]))
@@ -99,6 +104,12 @@ mod tests {
             assert_eq!(least_path(&counts, unary, ternary), brute(&counts, &unary, &ternary));
         }
         assert!(least_path(&[], |_, _| 0.0, |_, _, _, _| 0.0).is_empty());
+    }
+
+    #[test]
+    #[should_panic(expected = "each frame must have a state, got [2, 2, 0]")]
+    fn a_frame_without_a_state_is_refused() {
+        least_path(&[2, 2, 0], |_, _| 0.0, |_, _, _, _| 0.0);
     }
 
     /// |x| is known and x swings through zero: the second-order path crosses zero.

@@ -34,14 +34,14 @@ pub struct Rectangle {
 }
 
 impl Rectangle {
-    /// Number of columns.
+    /// Number of columns; 0 if the last one is before the first.
     pub fn width(&self) -> usize {
-        self.right - self.left + 1
+        self.right.checked_sub(self.left).map_or(0, |more| more + 1)
     }
 
-    /// Number of rows.
+    /// Number of rows; 0 if the last one is above the first.
     pub fn height(&self) -> usize {
-        self.bottom - self.top + 1
+        self.bottom.checked_sub(self.top).map_or(0, |more| more + 1)
     }
 
     /// The outer sides of the outermost pixels, moved inwards by `reach_px`: 0 for a silhouette,
@@ -151,6 +151,10 @@ impl Region {
     }
 
     /// The region as a mask of the given size; pixels outside it are dropped.
+    ///
+    /// # Panics
+    ///
+    /// If a side is zero, or a run ends before it starts.
     pub fn mask(&self, width: usize, height: usize) -> Mask {
         let mut mask = Image::filled(width, height, false);
         for run in self.runs.iter().filter(|run| run.y < height && run.start < width) {
@@ -159,12 +163,21 @@ impl Region {
         mask
     }
 
-    /// The borders of the region in frame coordinates; see [`outlines`].
+    /// The borders of the region in frame coordinates; see [`outlines`]. None without runs.
+    ///
+    /// # Panics
+    ///
+    /// If a run ends before it starts.
     pub fn outlines(&self) -> Vec<Outline> {
-        let Rectangle { left, top, .. } = self.rectangle;
-        let shifted =
-            self.runs.iter().map(|r| Run { y: r.y - top, start: r.start - left, end: r.end - left });
-        let local = Self::from_runs(shifted.collect()).mask(self.rectangle.width(), self.rectangle.height());
+        if self.runs.is_empty() {
+            return Vec::new();
+        }
+        let Self { mut runs, rectangle, .. } = Self::from_runs(self.runs.clone());
+        let Rectangle { left, top, .. } = rectangle;
+        for run in &mut runs {
+            *run = Run { y: run.y - top, start: run.start - left, end: run.end - left };
+        }
+        let local = Self::from_runs(runs).mask(rectangle.width(), rectangle.height());
         let mut outlines = outlines(&local);
         for [x, y] in outlines.iter_mut().flat_map(|outline| &mut outline.pixels) {
             *x += left;
@@ -245,7 +258,7 @@ pub(crate) fn group_regions_of(
     can_be_one: impl Fn(&Rectangle) -> bool,
 ) -> Vec<Region> {
     let mut parts: Vec<&Region> = regions.iter().filter(|part| part.area >= options.min_part_area).collect();
-    parts.sort_by_key(|part| (Reverse(part.area), part.runs[0]));
+    parts.sort_by_key(|part| (Reverse(part.area), part.runs.first().copied()));
     let mut groups = Vec::new();
     while !parts.is_empty() {
         let mut members = vec![parts.remove(0)];
@@ -260,7 +273,7 @@ pub(crate) fn group_regions_of(
         groups.push(Region::from_runs(members.iter().flat_map(|part| part.runs.iter().copied()).collect()));
     }
     groups.retain(|group| group.area >= options.min_area);
-    groups.sort_by_key(|group| (Reverse(group.area), group.runs[0]));
+    groups.sort_by_key(|group| (Reverse(group.area), group.runs.first().copied()));
     groups
 }
 
@@ -432,6 +445,32 @@ pub(super) mod tests {
         assert_eq!(groups[0], neighbour);
         assert_eq!(groups[1].rectangle, trunk.rectangle.union(&shoe.rectangle));
         assert_eq!(groups[1].area, trunk.area + shoe.area);
+    }
+
+    #[test]
+    fn group_options_outside_their_ranges_are_refused() {
+        let usual = GroupOptions::default();
+        for (name, options) in [
+            ("gap_x", GroupOptions { gap_x: f64::NAN, ..usual }),
+            ("gap_y", GroupOptions { gap_y: -0.1, ..usual }),
+            ("max_aspect", GroupOptions { max_aspect: 0.0, ..usual }),
+        ] {
+            assert_eq!(group_regions(&[], &options).unwrap_err().name, name);
+        }
+    }
+
+    /// All fields of regions and rectangles are public.
+    #[test]
+    fn regions_that_nobody_found_have_no_pixels_or_those_of_their_runs() {
+        let nowhere = Rectangle { left: 9, top: 9, right: 3, bottom: 8 };
+        assert_eq!([nowhere.width(), nowhere.height()], [0, 0]);
+        let empty = Region { runs: Vec::new(), rectangle: nowhere, area: 400 };
+        assert_eq!(group_regions(&[empty.clone(), empty.clone()], &GroupOptions::default()), Ok(Vec::new()));
+        assert!(empty.outlines().is_empty());
+        let found = block(20, 30, 5, 4);
+        let mut runs = found.runs.clone();
+        runs.reverse();
+        assert_eq!(Region { runs, rectangle: nowhere, ..found.clone() }.outlines(), found.outlines());
     }
 
     #[test]

@@ -9,7 +9,7 @@ pub struct Run {
     pub y: usize,
     /// First column.
     pub start: usize,
-    /// Column after the last one.
+    /// Column after the last one, more than `start`.
     pub end: usize,
 }
 

@@ -21,6 +21,9 @@ use thiserror::Error;
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum LocateError {
+    /// No frame shows the person.
+    #[error("a person must be sighted in at least one frame, got none")]
+    NoSighting,
     /// The rectangles do not fit a person standing on the ground in front of this camera.
     #[error(transparent)]
     Position(#[from] PositionError),
@@ -80,14 +83,22 @@ const LARGEST_SHARE: f64 = 1.5;
 const LEGS_SHARE: f64 = 0.5;
 
 /// Row of the soles and of the crown over all sightings, pixels.
-pub fn person_rows(sightings: &[Sighting]) -> (f64, f64) {
+///
+/// # Errors
+///
+/// There is no sighting.
+pub fn person_rows(sightings: &[Sighting]) -> Result<(f64, f64), LocateError> {
+    if sightings.is_empty() {
+        return Err(LocateError::NoSighting);
+    }
     let rows =
         |row: fn(&Rectangle) -> usize| sightings.iter().map(|s| row(&s.rectangle) as f64).collect::<Vec<_>>();
     let sole = quantile(rows(|r| r.bottom), SOLE_QUANTILE);
     let crown = quantile(rows(|r| r.top), CROWN_QUANTILE) + MASK_MARGIN_PX;
-    (sole, crown)
+    Ok((sole, crown))
 }
 
+/// A quantile of at least one value.
 fn quantile(mut values: Vec<f64>, q: f64) -> f64 {
     values.sort_by(f64::total_cmp);
     let at = q * (values.len() as f64 - 1.0);
@@ -98,6 +109,10 @@ fn quantile(mut values: Vec<f64>, q: f64) -> f64 {
 /// The camera assumed from the sightings of one person of known height; see [`Camera::from_person`].
 ///
 /// A tilted camera is the level one that sees soles and crown in the rows in which they would be, turned.
+///
+/// # Errors
+///
+/// There is no sighting, or the rows do not fit a person of this height.
 pub fn camera_from_sightings(
     sightings: &[Sighting],
     size: [u32; 2],
@@ -105,7 +120,7 @@ pub fn camera_from_sightings(
     height_m: f64,
     tilt: &Tilt,
 ) -> Result<Camera, LocateError> {
-    let (sole, crown) = person_rows(sightings);
+    let (sole, crown) = person_rows(sightings)?;
     let middle = sightings.iter().map(column).sum::<f64>() / sightings.len() as f64;
     let level = Camera::assumed(size, field_of_view_rad)?;
     // 1. The upright line through the middle of the rectangle meets its lower and its upper side.
@@ -147,7 +162,7 @@ pub struct Crown {
 
 /// The pooled rectangle of a person: the middles of its lower and its upper side, as an ideal camera sees them.
 pub(super) fn person_midpoints(sightings: &[Sighting], camera: &Camera) -> Result<Midpoints, LocateError> {
-    let (sole, crown) = person_rows(sightings);
+    let (sole, crown) = person_rows(sightings)?;
     let middle = sightings.iter().map(column).sum::<f64>() / sightings.len() as f64;
     Ok(Midpoints::undistorted(camera, DVec2::new(middle, sole), DVec2::new(middle, crown))?)
 }
@@ -194,6 +209,10 @@ impl Rows {
 }
 
 /// Finds the line parallel to the image plane on which the sighted person moves.
+///
+/// # Errors
+///
+/// There is no sighting, or the rows do not fit a person of this height.
 pub fn locate(sightings: &[Sighting], camera: &Camera, crown: &Crown) -> Result<Course, LocateError> {
     locate_by(Rows::Both, sightings, camera, crown)
 }
@@ -206,7 +225,7 @@ pub(super) fn locate_by(
     crown: &Crown,
 ) -> Result<Course, LocateError> {
     // 1. Depth of the line from the pooled rows at the sightings' mean column.
-    let (sole_row, crown_row) = person_rows(sightings);
+    let (sole_row, crown_row) = person_rows(sightings)?;
     let midpoints = person_midpoints(sightings, camera)?;
     let foot = rows.stand(camera, &midpoints, crown)?;
     let least_share = rows.least_share();
@@ -253,7 +272,7 @@ pub fn locate_slanting(sightings: &[Sighting], camera: &Camera, crown: &Crown) -
     }
     let path = Path { origin: start, heading_rad: (end - start).to_angle() };
     // 3. Positions along it.
-    let (sole_row, crown_row) = person_rows(sightings);
+    let (sole_row, crown_row) = person_rows(sightings).ok()?;
     let row = 0.5 * (sole_row + crown_row);
     let places: Vec<(f64, f64)> =
         sightings.iter().map(|s| (s.time_s, place(camera, &path, column(s), row))).collect();
@@ -357,6 +376,15 @@ mod tests {
         Crown { height_m, sd_m: 0.02 }
     }
 
+    #[test]
+    fn nobody_is_nowhere() {
+        let camera = Camera::level([640, 480], 1.0, 1.2, 5.0).unwrap();
+        assert_eq!(person_rows(&[]), Err(LocateError::NoSighting));
+        assert_eq!(locate(&[], &camera, &crown(1.7)), Err(LocateError::NoSighting));
+        let camera = camera_from_sightings(&[], [640, 480], 1.0, 1.7, &Tilt::default());
+        assert_eq!(camera, Err(LocateError::NoSighting));
+    }
+
     fn sighted(left: usize, top: usize, right: usize, bottom: usize) -> Sighting {
         Sighting { time_s: 0.0, rectangle: Rectangle { left, top, right, bottom } }
     }
@@ -377,7 +405,7 @@ mod tests {
         let seen: Vec<_> = bottoms.iter().zip(tops).map(|(b, t)| sighted(10, t, 60, *b)).collect();
         // 30 % of the way through 400, 402, ... and 50 % through the tops; the windows of eq. (1) extend 2 px
         // out.
-        assert_eq!(person_rows(&seen), (406.0, 117.0));
+        assert_eq!(person_rows(&seen), Ok((406.0, 117.0)));
     }
 
     #[test]
