@@ -43,9 +43,16 @@ pub(crate) fn side_by_side(region: Region) -> Vec<Region> {
         }
         is_near
     });
-    // 3. Borders half way between their sides.
-    let borders: Vec<usize> =
-        trunks.windows(2).map(|pair| (pair[0].right + pair[1].left).div_ceil(2)).collect();
+    // 3. Borders half way between their sides, or between their middles if one is over others: an arm, an umbrella. The
+    // middles increase, and so do the borders between them.
+    let between = |left: fn(&Rectangle) -> usize, right: fn(&Rectangle) -> usize| -> Vec<usize> {
+        trunks.windows(2).map(|pair| (left(&pair[0]) + right(&pair[1])).div_ceil(2)).collect()
+    };
+    let mut borders = between(|trunk| trunk.right, |trunk| trunk.left);
+    if !borders.is_sorted_by(|a, b| a < b) {
+        let middle = |trunk: &Rectangle| (trunk.left + trunk.right).div_ceil(2);
+        borders = between(middle, middle);
+    }
     if borders.is_empty() {
         return vec![region];
     }
@@ -60,7 +67,7 @@ pub(crate) fn side_by_side(region: Region) -> Vec<Region> {
             }
         }
     }
-    parts.into_iter().map(Region::from_runs).collect()
+    parts.into_iter().filter(|part| !part.is_empty()).map(Region::from_runs).collect()
 }
 
 #[cfg(test)]
@@ -103,6 +110,22 @@ mod tests {
             *row = "...###......";
         }
         assert_eq!(parts(&low), [(0, 11)]);
+    }
+
+    /// The rectangle of the first trunk, with its umbrella, holds the others.
+    #[test]
+    fn an_umbrella_over_others_leaves_each_pixel_with_one_person() {
+        let mut rows = vec![vec![b'.'; 110]; 60];
+        let mut draw = |ys: std::ops::Range<usize>, xs: std::ops::Range<usize>| {
+            rows[ys].iter_mut().for_each(|row| row[xs.clone()].fill(b'#'));
+        };
+        draw(0..60, 0..11);
+        draw(0..2, 0..101);
+        draw(4..60, 66..73);
+        draw(4..60, 76..99);
+        draw(58..60, 0..99);
+        let rows: Vec<&str> = rows.iter().map(|row| std::str::from_utf8(row).unwrap()).collect();
+        assert_eq!(parts(&rows), [(0, 59), (60, 77), (78, 100)]);
     }
 
     #[test]
