@@ -7,10 +7,14 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, DVectorView, Dyn};
 
-/// The change of velocity between two intervals, for motion whose velocity is a random walk: the factors of three
-/// successive values whose sum it is, and its variance if that of the walk is one per second.
+/// The change of velocity between two intervals, for motion whose velocity is a random walk with a variance of one per
+/// second: the factors of three successive values whose sum it is, and the variance (before + after) / 2 to weight it by.
+///
+/// This is the variance between the velocities at the middles of the intervals. The sum is the difference of the mean
+/// velocities, whose own variance is (before + after) / 3, and successive sums share a covariance of a sixth of their common
+/// interval. Terms that are added as independent neglect it; with the larger variance, they have the same power at low
+/// frequencies.
 pub fn velocity_change(before_s: f64, after_s: f64) -> ([f64; 3], f64) {
-    // Of a random walk over time, the velocities at the middles of the intervals are (before + after) / 2 apart.
     ([1.0 / before_s, -1.0 / before_s - 1.0 / after_s, 1.0 / after_s], 0.5 * (before_s + after_s))
 }
 
@@ -161,9 +165,15 @@ impl Arrow {
     }
 
     /// Adds `weight` (Σ coefficient x - `right`)² over unknowns of at most three neighbouring frames.
+    ///
+    /// # Panics
+    ///
+    /// If the unknowns are farther apart, or than the width of [`Arrow::banded`].
     pub fn add_row(&mut self, terms: &[(usize, f64)], right: f64, weight: f64) {
         for (n, &(i, a)) in terms.iter().enumerate() {
             for &(j, b) in &terms[..=n] {
+                let width = self.frames.width;
+                assert!(i.abs_diff(j) <= width, "unknowns {i} and {j} are farther apart than {width}");
                 let index = self.frames.index(i.max(j), i.min(j));
                 self.frames.values[index] += weight * a * b;
             }
@@ -438,6 +448,12 @@ mod tests {
             let found = solution.variance(&[(whole - 1, -0.5)], &everywhere);
             assert!((found - dense).abs() < 1e-8 * dense.max(1.0), "{found} against {dense}");
         }
+    }
+
+    #[test]
+    #[should_panic(expected = "unknowns 10 and 0 are farther apart than 2")]
+    fn a_row_over_frames_too_far_apart_is_refused() {
+        Arrow::new(11, 1, 1).add_row(&[(0, 1.0), (10, 1.0)], 0.0, 1.0);
     }
 
     #[test]
