@@ -22,7 +22,7 @@ pub struct LightReport {
 }
 
 /// Keeps the light of a stream of frames steady.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub struct SteadyLight {
     last: Option<Image<u8>>,
     flickers: bool,
@@ -116,6 +116,20 @@ mod tests {
             }
         }
         image
+    }
+
+    #[test]
+    fn a_copy_goes_on_as_the_light_would() {
+        let mut random = Random::new(3);
+        let frames = [1.0, 1.3, 1.0].map(|brightness| lit(&mut random, 0, brightness));
+        let mut light = SteadyLight::default();
+        light.push(&frames[0].as_frame(), LEAST).unwrap();
+        let mut copy = light.clone();
+        for frame in &frames[1..] {
+            let [one, other] = [&mut light, &mut copy].map(|light| light.push(&frame.as_frame(), LEAST));
+            assert_eq!(one, other);
+        }
+        assert_eq!((light.report(), light.report().frames), (copy.report(), 1));
     }
 
     fn mean(image: &Image<u8>) -> f64 {

@@ -145,6 +145,9 @@ pub struct Truth {
 }
 
 /// A scene: camera, walker and path, with frames on demand.
+///
+/// The fields are to be read. The wall, the start and the steps were made from them and do not follow if one is changed:
+/// another view is a scene of other [`SceneOptions`], another body that of [`SynthScene::with_walker`].
 #[derive(Debug, Clone)]
 pub struct SynthScene {
     /// The camera.

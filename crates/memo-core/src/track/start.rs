@@ -262,6 +262,7 @@ impl StartReport {
 }
 
 /// Whole-cycle search, for one direction the body may face.
+#[derive(Debug, Clone)]
 struct Faced {
     path: Path,
     /// Best hypothesis and similarity at each phase, of the frames searched so far.
@@ -271,6 +272,7 @@ struct Faced {
 }
 
 /// The search for a start on a few frames: [`glance`](Self::glance) at some of them, then [`finish`](Self::finish).
+#[derive(Debug, Clone)]
 pub struct StartSearch<'a> {
     frames: &'a [&'a FrameEdges],
     course: &'a Course,

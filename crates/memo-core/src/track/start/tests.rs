@@ -271,7 +271,8 @@ fn a_glance_is_a_start_on_some_of_the_frames() {
             crouched = crouched.after(&search);
             assert_eq!(crouched.glance(n), Some(glance));
             // In all frames only the direction that some of them left is looked at.
-            for started in [search.finish().unwrap(), crouched.finish().unwrap()] {
+            let copy = search.clone();
+            for started in [search, copy, crouched].map(|search| search.finish().unwrap()) {
                 let other_direction = of_some.other_direction;
                 let (here, there) = (whole.lines.best.similarity, other_direction.similarity);
                 let p_other_direction = swap_probability(here, there, 0.4, &options.swap);
