@@ -170,8 +170,8 @@ _SENTENCES: dict[str, Callable[[LeftOut], str]] = {
     "wrong size": lambda left: "too small or too large for a person who stands on the ground there.",
     "too wide": lambda left: "wider than one person: several people who move as one region, or a thing.",
     "too slow": lambda left: (
-        f"it hardly moved across the picture ({left.value or 0:.2f} m/s); somebody on a treadmill, or who "
-        "comes nearer or goes away, is found only while nobody else walks in the picture."
+        f"it hardly moved across the picture ({left.value or 0:.2f} m/s), and no walk on a treadmill, "
+        "towards the camera or away from it was found."
     ),
     "too fast": _fast,
     "not walking": lambda left: "its contours do not fit a person who walks.",

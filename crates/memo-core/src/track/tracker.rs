@@ -8,8 +8,9 @@
 //! 5. It ends the walk when the person leaves the image or stops walking (`ending`), and fits the person to all its frames
 //!    ([`fit`](super::fit)). Whoever walks on where the person was expected has the same number (`people`).
 //!
-//! Something that stays in one place for `path_frames` frames may walk on a treadmill (`on_the_spot`,
-//! [`treadmill`](super::treadmill)), while nobody else is followed.
+//! Something that stays in one place for `path_frames` frames may walk on a treadmill or along the line of sight
+//! (`on_the_spot`, [`treadmill`](super::treadmill)): before a given camera whoever else is followed, without one only while
+//! nobody is.
 //!
 //! Boxes around people from elsewhere, such as those of a detector, can be given instead of looking for moving regions
 //! ([`Tracker::update_with_boxes`]).
