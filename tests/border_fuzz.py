@@ -910,6 +910,14 @@ def shown(d):
     return memo.pointlight(walk.positions, walk.times_s, walk.names, noise_dots=d.size(4))
 
 
+@case("pointlight_cycle")
+def _(d):
+    motions = [memo.walker_motion(d.size(40, 1)) for _ in range(d.size(2))]
+    names = d.choice([motion.names for motion in motions], [["LAN"]], [])
+    period = d.options(period_s=lambda: d.number(0, 1))
+    return memo.pointlight_cycle([m.positions for m in motions], d.times(d.size(40)), names, **period)
+
+
 @case("pointlight_together")
 def _(d):
     displays = [shown(d) for _ in range(d.size(3))]

@@ -5,6 +5,7 @@ end fails here and is named.
 """
 
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -162,8 +163,9 @@ def test_a_frame_that_a_scene_does_not_have_is_an_index_error(index):
     ],
 )
 def test_a_type_error_states_the_types_of_python_in_one_line(call, words):
-    with pytest.raises(TypeError, match=words):
+    with pytest.raises(TypeError) as refused:
         call()
+    assert re.search(words, str(refused.value))
 
 
 def test_a_figure_of_no_size_is_refused():

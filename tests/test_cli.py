@@ -498,7 +498,7 @@ def test_tables_refuse_other_columns(tmp_path, core):
         columns | {"other": columns["x_m"]},
         columns | {"x_m": np.zeros(2)},
     ):
-        with pytest.raises(ValueError, match="track columns"):
+        with pytest.raises(ValueError, match=r"track columns|columns of different lengths"):
             write_track_csv(tmp_path / "track.csv", broken)
     assert not list(tmp_path.iterdir())
 

@@ -85,6 +85,7 @@ def test_other_pictures_of_a_walk_give_the_same_numbers(tracked, plain, name):
 
 
 def test_how_times_are_rounded_does_not_decide():
+    """Within a tenth of what is stated: the fit ends at another step of its descent."""
     scene = memo.demo_scene(0, frames=80)
 
     def columns(times_s):
@@ -94,5 +95,6 @@ def test_how_times_are_rounded_does_not_decide():
     for times_s in (scene.times_s * (1 + 1e-12), scene.times_s * (1 - 1e-12), scene.times_s + 7.7):
         found = columns(times_s)
         np.testing.assert_array_equal(found["frame"], expected["frame"])
-        for name, most in {"x_m": 1e-3, "y_m": 2e-3, "phase": 1e-3, "right_knee_deg": 0.1}.items():
-            np.testing.assert_allclose(found[name], expected[name], rtol=0, atol=most, err_msg=name)
+        for name in ("x_m", "y_m", "phase", "right_knee_deg"):
+            most = 0.1 * expected[f"sd_{name}"]
+            assert np.all(np.abs(found[name] - expected[name]) <= most), name

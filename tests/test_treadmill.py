@@ -72,7 +72,8 @@ def test_a_treadmill_can_be_excluded(scene):
     assert not any(walk.treadmill for walk in track.walks)
 
 
-def test_an_option_that_hides_the_walk_is_named(scene):
+def test_an_option_that_hides_the_walk_is_named():
+    scene = memo.demo_scene(0, frames=48, mover="treadmill")
     given = {"times_s": scene.times_s, "camera": scene.camera, "height_m": scene.height_m}
     track = memo.track(scene.frames, **given, treadmill=False)
     assert track.walks == []

@@ -714,10 +714,9 @@ class Track:
             )
         if self._size is not None and min(self._size) < 1.5 * SMALLEST_PX:
             width, height = (self.shrink * side for side in self._size)
-            return (
-                f"{_NOBODY[why]} Nobody less than {self.shrink * SMALLEST_PX} pixels high is seen, and the "
-                f"picture has only {width}x{height}."
-            )
+            least = counted(self.shrink * SMALLEST_PX, "pixel")
+            has = f"the picture has only {width}x{height}"
+            return f"{_NOBODY[why]} Nobody less than {least} high is seen, and {has}."
         if why == "not walking" and self._options.get("treadmill"):
             return f"{_NOBODY[why]} {_ONLY_ON_A_TREADMILL}"
         if why == "not walking" and self._camera is None:

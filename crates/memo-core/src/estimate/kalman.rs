@@ -142,7 +142,7 @@ impl ConstantVelocity {
 /// If there are fewer times than pairs of successive states.
 pub fn smooth(filtered: &[ConstantVelocity], dt_s: &[f64], noise: &Noise) -> Vec<ConstantVelocity> {
     let [steps, times] = [filtered.len().saturating_sub(1), dt_s.len()];
-    assert!(times >= steps, "{steps} steps need as many times, got {times}");
+    assert!(times >= steps, "fewer times than pairs of states: {times} < {steps}");
     let mut smoothed = filtered.to_vec();
     for k in (0..filtered.len().saturating_sub(1)).rev() {
         smoothed[k] = smooth_step(&filtered[k], &smoothed[k + 1], dt_s[k], noise);

@@ -91,7 +91,7 @@ pub fn filter_step(
 /// If there are fewer times than measurements.
 pub fn smooth_track(times_s: &[f64], measured: &[Measured], acceleration_sd: f64) -> Vec<Measured> {
     let [times, count] = [times_s.len(), measured.len()];
-    assert!(times >= count, "{count} measurements need as many times, got {times}");
+    assert!(times >= count, "fewer times than measurements: {times} < {count}");
     let first = measured.iter().position(|m| m.value.is_finite()).unwrap_or(measured.len());
     let steps: Vec<f64> = times_s[first..].windows(2).map(|pair| pair[1] - pair[0]).collect();
     let mut filter = None;
@@ -137,7 +137,7 @@ mod tests {
     }
 
     #[test]
-    #[should_panic(expected = "3 measurements need as many times, got 2")]
+    #[should_panic(expected = "fewer times than measurements: 2 < 3")]
     fn measurements_without_a_time_are_refused() {
         smooth_track(&[0.0, 0.1], &[Measured::NOTHING; 3], 1.0);
     }

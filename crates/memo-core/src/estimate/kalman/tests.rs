@@ -283,7 +283,7 @@ fn the_smoother_equals_the_series_conditioned_as_a_whole() {
 }
 
 #[test]
-#[should_panic(expected = "2 steps need as many times, got 1")]
+#[should_panic(expected = "fewer times than pairs of states: 1 < 2")]
 fn states_without_the_time_between_them_are_refused() {
     let noise = Noise { velocity_variance_per_s: 1.0, measurement_variance: 1.0 };
     smooth(&[ConstantVelocity::new(0.0, 0.0, 1.0, 1.0); 3], &[0.1], &noise);

@@ -5,7 +5,7 @@ use super::super::crowd::{body_box, clear_explained, keep_unowned};
 use super::super::evidence::Evidence;
 use super::super::fit::views::Piece;
 use super::super::height::{is_of_a_person, is_of_one_person};
-use super::super::left_out::Hindrance;
+use super::super::left_out::{Hindrance, SMALLEST_PX};
 use super::super::locate::{MASK_MARGIN_PX, Sighting, same_person};
 use super::super::walk::FrameEdges;
 use super::unfollowed::{Moving, with_small_ones};
@@ -49,6 +49,9 @@ impl Tracker {
         let most = if are_given { usize::MAX } else { MOST_CANDIDATES };
         let mut sightings: Vec<Sighting> = Vec::new();
         let mut hinder = |region: &Rectangle| {
+            if (region.height() as f64) < SMALLEST_PX {
+                return Some(Hindrance::Small);
+            }
             let Some(sighting) = whole(region, evidence) else { return Some(Hindrance::CutOff) };
             if !can_be(&sighting) {
                 return Some(Hindrance::WrongSize);
