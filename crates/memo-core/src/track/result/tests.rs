@@ -216,13 +216,8 @@ fn an_uncertain_distance_shows_across_the_path_and_far_from_the_camera_along_it(
 fn events_are_where_the_phase_passes_their_marks() {
     let times_s = uneven_s(50);
     let walk = followed(ACROSS, &exact(&times_s), WalkOptions::default());
-    // In adults, stance takes 61 % of the cycle; the left foot is half a cycle later.
-    let marks = [
-        (0.0, EventKind::HeelStrike, Side::Right),
-        (0.5, EventKind::HeelStrike, Side::Left),
-        (0.61, EventKind::ToeOff, Side::Right),
-        (0.11, EventKind::ToeOff, Side::Left),
-    ];
+    // The left foot is half a cycle later. When feet leave the ground, the phase does not show.
+    let marks = [(0.0, EventKind::HeelStrike, Side::Right), (0.5, EventKind::HeelStrike, Side::Left)];
     let mut expected = Vec::new();
     for (mark, kind, side) in marks {
         for turn in 0..4 {
