@@ -8,7 +8,7 @@ import memo
 import memo.video
 import numpy as np
 import pytest
-from conftest import SHARED_DATA
+from conftest import SHARED_DATA, shared_video
 from memo import _memo
 from memo.camera_motion import CameraMotion, outcome
 
@@ -141,3 +141,18 @@ def test_a_hand_held_recording_is_steadied():
             )
             off_px.append(focal * np.linalg.norm(rest[0]))
     assert np.sqrt(np.mean(np.square(off_px))) < 0.15 and steadier.losses() == []
+
+
+def test_a_cut_between_rooms_that_look_alike_ends_the_view():
+    """Both have brick walls of the same brightness; the second has another camera and another person."""
+    folders = [shared_video("mocap_a"), SHARED_DATA / "people" / "diagonal"]
+    if not folders[1].is_dir():
+        pytest.skip(f"no {folders[1]}")
+    frames = []
+    for folder, count in zip(folders, (45, 40), strict=True):
+        with memo.video.VideoReader(folder / "video.mp4") as reader:
+            frames += [frame.luma.copy() for frame, _ in zip(reader, range(count), strict=False)]
+    camera = memo.Camera.from_toml(folders[0] / "camera.toml")
+    track = memo.track(frames, fps=25, camera=camera, height_m=1.86)
+    assert "The view changes at frame 45 (a cut)." in track.sentences[0]
+    assert len(track.walks) == 1 and track.columns["frame"].max() < 45

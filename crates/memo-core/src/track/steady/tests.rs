@@ -319,23 +319,6 @@ fn a_cut_ends_the_view_of_a_given_camera_until_it_comes_back() {
     assert_eq!(back.state, CameraState::Turned);
 }
 
-/// Two walls of faint texture and the same brightness. One that a codec draws anew every 25 frames is another one too, but
-/// hardly differs.
-#[test]
-fn a_cut_between_rooms_that_look_alike_is_found_later() {
-    let camera = camera();
-    for (contrast, cut) in [(0.35, true), (0.08, false)] {
-        let mut steadier = steadier(Some(&camera));
-        for k in 0..60u32 {
-            let wall = |at: DVec2| Some(120.0 + contrast * (texture(k / 25, at, 8.0) - 120.0));
-            let shot = Shot { noise: 0.5, seed: k, ..Shot::of(&camera, [0.0; 3]) };
-            pushed(&mut steadier, &shot.drawn(|grey| grey, wall));
-        }
-        let expected: &[Loss] = if cut { &[Loss { frame: 25, reason: LossReason::Cut }] } else { &[] };
-        assert_eq!(steadier.losses(), expected, "{contrast}");
-    }
-}
-
 #[test]
 fn without_a_camera_another_shot_is_a_view_of_its_own() {
     let camera = camera();
