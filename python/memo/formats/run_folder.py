@@ -138,9 +138,8 @@ def _measured(
         side, _, name = joint.partition("_")
         needed = [angles.get(f"{side}_{angle}") for angle in _ANGLES_BEFORE.get(name, ())]
         of_angles = [unknown if values is None else ~np.isfinite(values) for values in needed]
-        return np.logical_or.reduce([~unknown, *of_angles]) & np.isfinite(points[:, names.index(joint)]).all(
-            -1
-        )
+        is_known = np.isfinite(points[:, names.index(joint)]).all(axis=1)
+        return is_known & np.any(of_angles, axis=0) if of_angles else ~unknown
 
     frames = {name: is_assumed(name) for name in names}
     counts = {name: int(assumed.sum()) for name, assumed in frames.items() if assumed.any()}

@@ -39,8 +39,8 @@
 //! camera if none is given.
 
 use super::decisions::{
-    CONTACT_COMMON_SD_S, CONTACT_SD_S, CONTACT_SIDE_SD_S, POSTURE_SD, RANGE_SD_RAD, REACH_COUNTS, REACH_SD_M,
-    STRIKE_SD_CYCLES, TOE_OFF_COMMON_SD_S,
+    BELT_CONTACT_SD_S, CONTACT_COMMON_SD_S, CONTACT_SD_S, CONTACT_SIDE_SD_S, POSTURE_SD, RANGE_SD_RAD,
+    REACH_COUNTS, REACH_SD_M, STRIKE_SD_CYCLES, TOE_OFF_COMMON_SD_S,
 };
 use super::event::EventKind;
 use super::fit::belt::Belt;
@@ -202,11 +202,11 @@ impl TrackedWalk {
         add(DoubleSupport, None, double);
         let [right, left] = [Side::Right, Side::Left].map(|side| stance(Some(side)));
         // One foot stands alone while the other swings, and no longer than it stands.
-        let is_walked = right.zip(left).is_none_or(|(right, left)| right.value + left.value >= 100.0);
+        let is_on_ground = right.zip(left).is_none_or(|(right, left)| right.value + left.value >= 100.0);
         for (side, own, other) in [(Side::Right, right, left), (Side::Left, left, right)] {
             add(Stance, Some(side), own);
             add(Swing, Some(side), own.map(rest));
-            add(SingleSupport, Some(side), other.map(rest).filter(|_| is_walked));
+            add(SingleSupport, Some(side), other.map(rest).filter(|_| is_on_ground));
         }
         for side in [Side::Right, Side::Left] {
             add(HipRange, Some(side), self.motion(side, 0).map(|m| m.range));
@@ -594,10 +594,6 @@ struct BySide {
     mean: [Option<Estimate>; 2],
     symmetry: Option<Estimate>,
 }
-
-/// Standard deviation of a shift of one side's contacts on a treadmill beyond that over ground, seconds.
-/// Sides of drawn people are 49 ms early to 30 ms late there.
-const BELT_CONTACT_SD_S: f64 = 0.025;
 
 /// Standard deviation of a shift of one side's contacts: the difference between the sides has `CONTACT_SIDE_SD_S`.
 fn contact_shift_sd_s() -> f64 {

@@ -56,7 +56,7 @@ impl Standing {
 
     /// How much of a rectangle is where the thing was last seen; `None` if it is elsewhere.
     pub(super) fn overlap(&self, rectangle: &Rectangle) -> Option<f64> {
-        let last = self.kept.iter().rev().find_map(|(sighting, _)| *sighting)?.rectangle;
+        let last = last_rectangle(&self.kept)?;
         (last.gap(rectangle) == [0, 0]).then(|| last.sides(0.0).overlap(&rectangle.sides(0.0)))
     }
 
@@ -123,6 +123,11 @@ impl Standing {
     pub(super) fn sightings(&self) -> Vec<Sighting> {
         self.kept.iter().filter_map(|(sighting, _)| *sighting).collect()
     }
+}
+
+/// Where the latest of some frames show the thing.
+pub(super) fn last_rectangle(kept: &[(Option<Sighting>, FrameEdges)]) -> Option<Rectangle> {
+    kept.iter().rev().find_map(|(sighting, _)| Some(sighting.as_ref()?.rectangle))
 }
 
 #[cfg(test)]

@@ -6,10 +6,9 @@ use super::super::candidate::{COMFORTABLE_MPS, Given, course, feet_cut_off};
 use super::super::decisions::MOST_APART_S;
 use super::super::evidence::Evidence;
 use super::super::fit::views::Piece;
-use super::super::height::is_of_a_person;
 use super::super::locate::{Crown, Rows, Sighting, locate_by};
 use super::super::options::{approaching_height, start_height};
-use super::super::standing::Standing;
+use super::super::standing::{Standing, last_rectangle};
 use super::super::treadmill::Spot;
 use super::{TrackError, Tracker, WINDOW_MARGIN_PX, feet, grown};
 
@@ -28,20 +27,15 @@ impl Tracker {
         largest: Option<Sighting>,
         sightings: &[Sighting],
     ) -> Result<(), TrackError> {
-        let given_m = || self.options.height_m.iter().chain(&self.options.further_heights_m).copied();
-        let is_of_a_person = |sighting: &&Sighting| {
-            let camera = self.options.camera.as_ref();
+        let given = self.options.camera.as_ref();
+        let is_further = |sighting: &&Sighting| {
             largest.as_ref() != Some(sighting)
-                && camera.is_some_and(|camera| is_of_a_person(camera, sighting, given_m()))
+                && given.is_some_and(|camera| self.is_of_a_person(camera, sighting))
         };
-        let further = sightings.iter().filter(is_of_a_person).copied();
+        let further = sightings.iter().filter(is_further).copied();
         let mut seen: Vec<Sighting> = largest.into_iter().chain(further).collect();
         for standing in std::mem::take(&mut self.standings) {
-            let overlap = |sighting: &Sighting| standing.overlap(&sighting.rectangle);
-            let own = (0..seen.len()).filter(|&k| overlap(&seen[k]).is_some());
-            let own = own.max_by(|&a, &b| {
-                overlap(&seen[a]).unwrap_or(0.0).total_cmp(&overlap(&seen[b]).unwrap_or(0.0))
-            });
+            let own = most(seen.iter().map(|sighting| standing.overlap(&sighting.rectangle)));
             let own = own.map(|k| seen.remove(k));
             if let Some(standing) = self.stood(standing, own, evidence)? {
                 self.standings.push(standing);
@@ -75,15 +69,10 @@ impl Tracker {
         Ok(Some(standing.with(sighting, feet, edges, piece)))
     }
 
-    /// Takes the frames of what somebody stood for who starts to be followed.
+    /// Takes the frames of what stood where somebody starts to be followed.
     pub(super) fn standing_of(&mut self, active: &Active) -> Standing {
-        let at = active.kept.iter().rev().find_map(|(sighting, _)| Some(sighting.as_ref()?.rectangle));
-        let overlap = |standing: &Standing| at.as_ref().and_then(|at| standing.overlap(at));
-        let own = (0..self.standings.len()).filter(|&k| overlap(&self.standings[k]).is_some());
-        let own = own.max_by(|&a, &b| {
-            let [a, b] = [a, b].map(|k| overlap(&self.standings[k]).unwrap_or(0.0));
-            a.total_cmp(&b)
-        });
+        let Some(at) = last_rectangle(&active.kept) else { return Standing::default() };
+        let own = most(self.standings.iter().map(|standing| standing.overlap(&at)));
         own.map(|k| self.standings.remove(k)).unwrap_or_default()
     }
 
@@ -115,9 +104,8 @@ impl Tracker {
         match begun.or_else(along_the_sight) {
             Ok(active) if !self.is_of_its_own(&active) => None,
             Ok(mut active) => {
-                let last =
-                    active.kept.iter().rev().find_map(|(sighting, _)| Some(sighting.as_ref()?.rectangle));
-                self.candidates.retain(|candidate| !last.is_some_and(|last| candidate.is_at(&last)));
+                let at = last_rectangle(&active.kept);
+                self.candidates.retain(|candidate| !at.is_some_and(|at| candidate.is_at(&at)));
                 match self.gone_on(&active) {
                     Some(joined) => active = joined,
                     None => active.person = self.identified(&active),
@@ -227,4 +215,10 @@ impl Tracker {
             Err(_) => active,
         }
     }
+}
+
+/// The place of the largest overlap; `None` if there is none.
+fn most(overlaps: impl Iterator<Item = Option<f64>>) -> Option<usize> {
+    let known = overlaps.enumerate().filter_map(|(k, overlap)| Some((k, overlap?)));
+    known.max_by(|a, b| a.1.total_cmp(&b.1)).map(|(k, _)| k)
 }

@@ -11,6 +11,7 @@ use super::super::walk::FrameEdges;
 use super::unfollowed::{Moving, with_small_ones};
 use super::{TrackError, Tracker, WINDOW_MARGIN_PX, grown, whole};
 use crate::image::{GroupOptions, Mask, Rectangle, Region, group_regions_of, regions, side_by_side};
+use crate::model::Camera;
 use std::sync::Arc;
 
 /// At most this many regions are looked at in a frame, the largest: they bound its time.
@@ -43,9 +44,7 @@ impl Tracker {
         };
         self.candidates.iter_mut().for_each(|candidate| candidate.missed += 1);
         let camera = if self.people.is_empty() { None } else { self.camera() };
-        let given_m = || self.options.height_m.iter().chain(&self.options.further_heights_m).copied();
-        let can_be =
-            |sighting: &Sighting| camera.is_none_or(|camera| is_of_a_person(camera, sighting, given_m()));
+        let can_be = |sighting: &Sighting| camera.is_none_or(|camera| self.is_of_a_person(camera, sighting));
         let most = if are_given { usize::MAX } else { MOST_CANDIDATES };
         let mut sightings: Vec<Sighting> = Vec::new();
         let mut hinder = |region: &Rectangle| {
@@ -157,6 +156,12 @@ impl Tracker {
                 .with_crown(alone)
         });
         Ok(Seen { sighting, edges, piece })
+    }
+
+    /// True if a camera shows a region to be as high as a person, or as one of a given height.
+    pub(super) fn is_of_a_person(&self, camera: &Camera, sighting: &Sighting) -> bool {
+        let given_m = self.options.height_m.iter().chain(&self.options.further_heights_m).copied();
+        is_of_a_person(camera, sighting, given_m)
     }
 
     /// The edges of a window that are nobody's who is followed, with the bodies of those.
