@@ -912,10 +912,12 @@ def shown(d):
 
 @case("pointlight_cycle")
 def _(d):
-    motions = [memo.walker_motion(d.size(40, 1)) for _ in range(d.size(2))]
-    names = d.choice([motion.names for motion in motions], [["LAN"]], [])
-    period = d.options(period_s=lambda: d.number(0, 1))
-    return memo.pointlight_cycle([m.positions for m in motions], d.times(d.size(40)), names, **period)
+    frames, actors = d.size(97, 64), d.size(2, 1)
+    lengths = [d.size(97) if d.is_wrong() else frames for _ in range(actors)]
+    motions = [memo.walker_motion(length, rate_hz=25) for length in lengths]
+    names = [d.choice(motion.names, ["LAN"], []) if d.is_wrong() else motion.names for motion in motions]
+    period = d.options(period_s=lambda: d.number(0.8, 1.3))
+    return memo.pointlight_cycle([m.positions for m in motions], d.times(frames), names, **period)
 
 
 @case("pointlight_together")

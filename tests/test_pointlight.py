@@ -120,6 +120,8 @@ def test_scrambling_keeps_heights_or_stays_within_a_limit():
     still = np.random.default_rng(0).normal(size=(80, 3, 3))
     with pytest.raises(ValueError, match=r"no period found.*give period_s"):
         memo.pointlight(still, np.arange(80) / 60, ["a", "b", "c"], cycles=1)
+    with pytest.raises(ValueError, match=r"up to 0.07 s: no lag fits better than those around it; give"):
+        memo.pointlight(still[:6], np.arange(6) / 60, ["a", "b", "c"], cycles=1)
 
 
 def test_a_walk_of_whole_cycles_has_the_nearest_speed():

@@ -25,8 +25,8 @@ pub enum PointLightError {
     },
     /// The motion does not repeat itself.
     #[error(
-        "no period found up to {searched_s:.2} s: at the best lag, the mismatch is {mismatch:.2} of that of unrelated \
-         positions (at most 0.2 wanted); give period_s, or shift the phases with \"shortened\""
+        "no period found up to {searched_s:.2} s: {}; give period_s, or shift the phases with \"shortened\"",
+        best_lag(*.mismatch)
     )]
     NoPeriod {
         /// Mismatch at the best lag, as a share of that of unrelated positions; infinite if no lag is better
@@ -345,5 +345,16 @@ impl Default for PointLightOptions {
             noise_dots: None,
             noise_sd_px: 0.0,
         }
+    }
+}
+
+/// What the best of the lags came to.
+fn best_lag(mismatch: f64) -> String {
+    if mismatch.is_finite() {
+        format!(
+            "at the best lag, the mismatch is {mismatch:.2} of that of unrelated positions (at most 0.2 wanted)"
+        )
+    } else {
+        "no lag fits better than those around it".to_owned()
     }
 }
