@@ -617,7 +617,7 @@ def _(d, name):
 def tracker_options(d):
     return d.options(
         fov_deg=lambda: d.number(5, 170),
-        gait=lambda: d.choice("dense", "sampled_10", "boulic"),
+        gait=lambda: d.choice("dense", "sampled_10"),
         adapt=lambda: d.choice(True, False),
         start_frames=lambda: d.whole(5, 20),
         treadmill=lambda: d.choice(None, True, False),

@@ -49,7 +49,7 @@ class Row:
 
 def rows_of(clip: score_walks.Clip) -> Iterator[Row]:
     """A row for each way that works."""
-    named = score_walks.ClipScore(clip.name, 0.0, 0, (0, 0, 0))
+    named = score_walks.ClipScore(clip.name, 0.0, 0)
     camera_file = clip.folder / "camera.toml"
     camera, truth = memo.Camera.from_toml(camera_file), gt.read_columns(clip.folder / "truth.csv")
     figures = score_postures.stick({CODES[code]: gt.points(truth, f"{code}_") for code in CODES})

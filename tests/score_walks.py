@@ -28,6 +28,7 @@ import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass, field
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -97,6 +98,14 @@ class Claim:
 
 
 @dataclass(frozen=True)
+class Swap:
+    """The probability stated for a walk that its sides are exchanged, and whether they are."""
+
+    probability: float
+    is_swapped: bool
+
+
+@dataclass(frozen=True)
 class Interval:
     """A row of the gait parameters that has an interval, with what is true."""
 
@@ -117,8 +126,6 @@ class ClipScore:
     coverage: float
     """Share of the truth's frames that are tracked."""
     walks: int
-    sides: tuple[int, int, int]
-    """Numbers of walks with sides right, wrong, and open; none of them if the true phase is not known."""
     rms_deg: Mapping[str, float] = field(default_factory=dict)
     centred_deg: Mapping[str, float] = field(default_factory=dict)
     along_m: float = math.nan
@@ -130,12 +137,20 @@ class ClipScore:
     claims: Mapping[str, Claim] = field(default_factory=dict)
     gait: tuple[Interval, ...] = ()
     true_symmetry: Mapping[str, float] = field(default_factory=dict)
+    swaps: tuple[Swap, ...] = ()
+    """One per walk whose true sides are known."""
 
     @property
     def person(self) -> str:
         """Who walks."""
         parts = self.name.split("_")
         return "_".join(parts[:2]) if parts[0] == "mocap" else parts[0]
+
+    @property
+    def sides(self) -> tuple[int, int, int]:
+        """Numbers of walks with sides right, wrong, and open."""
+        said = [swap.is_swapped for swap in self.swaps if swap.probability <= OPEN]
+        return said.count(False), said.count(True), len(self.swaps) - len(said)
 
     @property
     def people(self) -> str:
@@ -156,9 +171,9 @@ class ClipScore:
         return cls(
             **values
             | {
-                "sides": tuple(values["sides"]),
                 "claims": {name: Claim(**claim) for name, claim in values["claims"].items()},
                 "gait": tuple(Interval(**row) for row in values["gait"]),
+                "swaps": tuple(Swap(**swap) for swap in values["swaps"]),
             }
             | {
                 kind: Timing(values[kind]["true"], tuple(values[kind]["errors_ms"]))
@@ -205,7 +220,7 @@ def score(
         "true_symmetry": {name: value for (name, _), value in true.items() if name in SYMMETRY},
     }
     if not np.isfinite(gt.points(track, "")).all(axis=1).any():
-        return ClipScore(name, 0.0, 0, (0, 0, 0), **common)
+        return ClipScore(name, 0.0, 0, **common)
     track = gt.tracked_rows(track, name)
     in_track, in_truth = gt.common_frames(track["frame"], truth["frame"])
     here = {column: values[in_track] for column, values in track.items()}
@@ -236,7 +251,7 @@ def score(
         name,
         coverage=in_truth.size / truth["frame"].size,
         walks=np.unique(track["walk"]).size,
-        sides=_sides(here, phase),
+        swaps=_swaps(here, phase),
         rms_deg={joint: _both_sides_rms(errors_deg, joint, centred=False) for joint in JOINTS},
         centred_deg={joint: _both_sides_rms(errors_deg, joint, centred=True) for joint in JOINTS},
         along_m=_rms(place["along_m"]),
@@ -266,19 +281,16 @@ def _away(truth: gt.Columns, forward: np.ndarray, camera_m: Sequence[float]) -> 
     return across if seen @ across[:2] >= 0.0 else -across
 
 
-def _sides(track: gt.Columns, phase_error: np.ndarray) -> tuple[int, int, int]:
-    """Numbers of walks with the sides right, wrong and open."""
-    right = wrong = undecided = 0
+def _swaps(track: gt.Columns, phase_error: np.ndarray) -> tuple[Swap, ...]:
+    """Per walk, the stated probability that the sides are exchanged, and whether they are."""
+    swaps = []
     for walk in np.unique(track["walk"]):
         rows = track["walk"] == walk
         known = phase_error[rows & np.isfinite(phase_error)]
-        if np.median(track["p_swapped"][rows]) > OPEN:
-            undecided += 1
-        elif known.size and np.mean(np.abs(known) > 0.25) > 0.5:
-            wrong += 1
-        elif known.size:
-            right += 1
-    return right, wrong, undecided
+        if known.size:
+            is_swapped = bool(np.mean(np.abs(known) > 0.25) > 0.5)
+            swaps.append(Swap(float(np.median(track["p_swapped"][rows])), is_swapped))
+    return tuple(swaps)
 
 
 def _both_sides_rms(errors: Mapping[str, np.ndarray], joint: str, *, centred: bool) -> float:
@@ -631,6 +643,16 @@ def _mean(values: np.ndarray) -> float:
     return gt.Spread.of(values).mean
 
 
+def swap_bands(clips: Sequence[ClipScore]) -> list[tuple[str, list[Swap]]]:
+    """The walks by the probability stated that their sides are exchanged."""
+    ends = (-1.0, 0.02, 0.1, OPEN, 0.35, 1.0)
+    swaps = [swap for clip in clips for swap in clip.swaps]
+    return [
+        (f"{max(low, 0.0):.2f}-{high:.2f}", [swap for swap in swaps if low < swap.probability <= high])
+        for low, high in pairwise(ends)
+    ]
+
+
 # Printing
 
 Row = Mapping[str, float]
@@ -758,6 +780,16 @@ def asymmetry_lines(clips: Sequence[ClipScore], before: Sequence[ClipScore]) -> 
     )
 
 
+def swap_table(clips: Sequence[ClipScore]) -> str:
+    """One line per band of probabilities: the mean of those stated, and how often it was so."""
+    lines = [["stated", "walks", "mean", "exchanged"]]
+    for band, swaps in swap_bands(clips):
+        stated = np.array([swap.probability for swap in swaps])
+        exchanged = sum(swap.is_swapped for swap in swaps)
+        lines.append([band, f"{len(swaps)}", _number(_mean(stated), 3), f"{exchanged}"])
+    return _aligned(lines)
+
+
 def report(
     clips: Sequence[ClipScore],
     demo: DemoScore | None,
@@ -779,6 +811,7 @@ def report(
             + share_table(claim_hits(clips), claim_hits(before)),
             "True gait parameters of clips in their 95 % intervals, ± by people\n"
             + share_table(gait_hits(clips), gait_hits(before)),
+            f"Probability that right and left are exchanged\n{swap_table(clips)}",
             f"Asymmetries (true ones from {SYMMETRIC_PERCENT:g} %)\n{asymmetry_lines(clips, before)}",
         ]
         unjudged = sorted({g.parameter for clip in clips for g in clip.gait} - gait_hits(clips).keys())

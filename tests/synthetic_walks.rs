@@ -174,14 +174,12 @@ fn a_walk_is_tracked_as_well_at_a_high_frame_rate() {
 }
 
 #[test]
-fn other_gaits_and_velocity_weights_track_as_well() {
+fn ten_samples_and_velocity_weights_track_as_well() {
     // Without the fit, which has curves of its own.
     let scene = SynthScene::new(SceneOptions { seed: 1, ..SceneOptions::default() }).unwrap();
-    for gait in [GaitChoice::Sampled10, GaitChoice::Boulic] {
-        let options = TrackerOptions { gait, fit: None, ..options_for(&scene) };
-        let walks = tracked_with(&scene, 0..scene.len(), options);
-        assert!(errors(&scene, &walks[0])[2] < 0.06, "{gait:?}");
-    }
+    let options = TrackerOptions { gait: GaitChoice::Sampled10, fit: None, ..options_for(&scene) };
+    let walks = tracked_with(&scene, 0..scene.len(), options);
+    assert!(errors(&scene, &walks[0])[2] < 0.06);
     let mut options = TrackerOptions { fit: None, ..options_for(&scene) };
     options.evidence.flow = Some(memo_core::image::FlowOptions::default());
     options.walk.similarity.full_velocity = Some(2.0);

@@ -106,4 +106,4 @@ def test_a_tracker_keeps_the_values_of_the_defaults():
     assert {name: options[name] for name in ("gait", "start_frames", "measure")} == {
         name: usual[name] for name in ("gait", "start_frames", "measure")
     }
-    assert memo.Tracker(gait="boulic", start_frames=9).options["start_frames"] == 9
+    assert memo.Tracker(gait="sampled_10", start_frames=9).options["start_frames"] == 9

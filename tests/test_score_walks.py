@@ -155,6 +155,7 @@ def test_sides_are_right_wrong_or_open(shift, p_swapped, sides):
     track["p_swapped"][:] = p_swapped
     clip = scored(Walker(), track, mean_sds=[{"phase": 0.02}])
     assert clip.sides == sides
+    assert clip.swaps == (sw.Swap(pytest.approx(p_swapped), shift != 0.0),)
     assert ("phase" in clip.claims) == (sides[2] == 0)
     if sides[1]:  # a claim of the wrong side is a wrong phase
         assert abs(clip.claims["phase"].error) == pytest.approx(0.5)
@@ -316,7 +317,7 @@ def test_intervals_are_judged_by_parameter_side_and_unit():
         "speed",
         "foot_clearance",
     ]
-    clip = sw.ClipScore("ANTO__x", 1.0, 1, (1, 0, 0), gait=found)
+    clip = sw.ClipScore("ANTO__x", 1.0, 1, gait=found)
     hits = sw.gait_hits([clip])
     assert {name: [hit.holds for hit in of] for name, of in hits.items()} == {
         "cadence": [True],
@@ -329,7 +330,7 @@ def test_asymmetries_are_false_where_the_true_steps_are_symmetric():
     def clip(name: str, true: float, low: float, high: float) -> sw.ClipScore:
         said = sw.Interval("step_time_symmetry", "", (low + high) / 2.0, low, high, true)
         symmetry = {"step_time_symmetry": true}
-        return sw.ClipScore(name, 1.0, 1, (1, 0, 0), gait=(said,), true_symmetry=symmetry)
+        return sw.ClipScore(name, 1.0, 1, gait=(said,), true_symmetry=symmetry)
 
     clips = [
         clip("silent", 3.9, -5.0, 9.0),
@@ -358,7 +359,9 @@ def test_shares_take_people_not_clips_as_independent():
 def test_pooled_figures_are_root_mean_squares_of_the_clips():
     def clip(hip: float, bias: float, errors_ms: tuple[float, ...]) -> sw.ClipScore:
         figures = {"rms_deg": {"hip": hip}, "distance_m": abs(bias), "distance_bias_m": bias}
-        return sw.ClipScore("ANTO__x", 1.0, 1, (1, 0, 0), contacts=sw.Timing(4, errors_ms), **figures)
+        return sw.ClipScore(
+            "ANTO__x", 1.0, 1, swaps=(sw.Swap(0.01, False),), contacts=sw.Timing(4, errors_ms), **figures
+        )
 
     figures = sw.row(
         [clip(3.0, 0.1, (10.0, 20.0, 30.0)), clip(5.0, -0.3, (-20.0,)), clip(np.nan, np.nan, ())]
@@ -386,9 +389,23 @@ def test_pooled_figures_are_root_mean_squares_of_the_clips():
     ],
 )
 def test_clips_have_a_person_and_a_group(name, person, people, group):
-    clip = sw.ClipScore(name, 1.0, 1, (1, 0, 0))
+    clip = sw.ClipScore(name, 1.0, 1)
     assert (clip.person, clip.people, clip.group) == (person, people, group)
     assert list(sw.pooled_rows([clip])) == [f"{group}; {people}"]
+
+
+def test_stated_probabilities_stand_beside_how_often_sides_are_exchanged():
+    swaps = (sw.Swap(0.0, False), sw.Swap(0.02, True), sw.Swap(0.3, True), sw.Swap(1.0, False))
+    clip = sw.ClipScore("ANTO__x", 1.0, 4, swaps=swaps)
+    lines = [line.split() for line in sw.swap_table([clip, clip]).splitlines()[1:]]
+    assert lines == [
+        ["0.00-0.02", "4", "0.010", "2"],
+        ["0.02-0.10", "0", "-", "0"],
+        ["0.10-0.20", "0", "-", "0"],
+        ["0.20-0.35", "2", "0.300", "2"],
+        ["0.35-1.00", "2", "1.000", "0"],
+    ]
+    assert clip.sides == (1, 1, 2)
 
 
 def demo(tmp_path: Path) -> sw.DemoScore:

@@ -99,7 +99,7 @@ def test_every_frame_needs_a_time(timing, reason):
 @pytest.mark.parametrize(
     ("options", "error", "reason"),
     [
-        ({"gait": "run"}, ValueError, "'sampled_10' or 'boulic', got \"run\""),
+        ({"gait": "run"}, ValueError, "'dense' or 'sampled_10', got \"run\""),
         ({"camera": "camera.toml"}, TypeError, "'str' object is not an instance of 'Camera'"),
         ({"speed": 1}, TypeError, "speed"),
     ],
@@ -260,7 +260,7 @@ def test_times_are_numbers(time_s):
         ({"fov_deg": np.nan}, "field of view must be between"),
         ({"start_frames": 1}, "start_frames must be between 5 and 100, got 1"),
         ({"start_frames": -1}, "start_frames must be between"),
-        ({"gait": "moonwalk"}, "gait must be 'dense', 'sampled_10' or 'boulic', got \"moonwalk\""),
+        ({"gait": "moonwalk"}, "gait must be 'dense' or 'sampled_10', got \"moonwalk\""),
         ({"measure": "x"}, "measure must be 'rohr' or 'lowe'"),
         ({"full_velocity": 0.0}, "full_velocity must be positive and finite"),
     ],

@@ -60,7 +60,7 @@ class Tracker:
     `fov_deg` and the height; the default is across the width of the image, or across its height if that is
     larger. The results lag one frame behind the input, or a thirtieth of a second at a higher frame rate.
 
-    `gait`: "dense", "sampled_10" (the paper's ten samples) or "boulic" (amplitude follows speed).
+    `gait`: "dense" or "sampled_10" (the paper's ten samples).
     `adapt=False` does not fit the person: angles are those of the average gait, moved by the tracked phase.
     `start_frames`: number of frames in the starting phase; at more than 30 frames per second, as many as
     last as long.

@@ -94,7 +94,7 @@ fn read(csv: &str) -> Result<Keypoints, Box<dyn Error>> {
 /// A walker at 25 Hz and 1 px of noise, seen from the side by a level camera 6 m away.
 fn synthetic(frames: usize) -> Result<(Keypoints, Camera), Box<dyn Error>> {
     let camera = Camera::level([1920, 1080], 0.9273, 1.2, 6.0)?;
-    let walker = TrackerOptions::default().walker(HEIGHT_M, 1.3)?;
+    let walker = TrackerOptions::default().walker(HEIGHT_M)?;
     let walk = sampled_walk(
         &walker,
         &SampledWalkOptions { frames, rate_hz: 25.0, ..SampledWalkOptions::default() },

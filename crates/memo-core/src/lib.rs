@@ -53,7 +53,7 @@
 //!
 //! // A walk seen from its side. Its points are named RSH, REL and so on; for a known detector use
 //! // `Detector::from_layout(Layout::by_name("coco-17")?)`.
-//! let walker = TrackerOptions::for_height(1.75).walker(1.75, 1.3)?;
+//! let walker = TrackerOptions::for_height(1.75).walker(1.75)?;
 //! let options = SampledWalkOptions { frames: 30, rate_hz: 25.0, ..SampledWalkOptions::default() };
 //! let walk = sampled_walk(&walker, &options)?;
 //! let camera = Camera::level([1280, 720], 1.0, 1.2, 6.0)?;
@@ -95,7 +95,7 @@
 //! use memo_core::synth::{SampledWalkOptions, limbs_of};
 //! use memo_core::{FigureOptions, TrackerOptions, interpret_figure};
 //!
-//! let walker = TrackerOptions::for_height(1.75).walker(1.75, 1.3)?;
+//! let walker = TrackerOptions::for_height(1.75).walker(1.75)?;
 //! let walk = sampled_walk(&walker, &SampledWalkOptions::default())?;
 //! let shown = point_light_display(&walk, &PointLightOptions::default())?;
 //!

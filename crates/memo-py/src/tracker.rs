@@ -257,9 +257,9 @@ impl PyTracker {
         options.camera = camera.map(|camera| camera.0);
         options.field_of_view_rad = fov_deg.map(f64::to_radians);
         if let Some(gait) = gait {
-            let known = [GaitChoice::Dense, GaitChoice::Sampled10, GaitChoice::Boulic];
+            let known = [GaitChoice::Dense, GaitChoice::Sampled10];
             let found = known.into_iter().find(|known| gait_name(*known) == gait);
-            let refused = || choice_error("gait", "'dense', 'sampled_10' or 'boulic'", gait);
+            let refused = || choice_error("gait", "'dense' or 'sampled_10'", gait);
             options.gait = found.ok_or_else(refused)?;
         }
         options.evidence.change.compensate_gain = compensate_gain;
@@ -368,7 +368,6 @@ fn gait_name(gait: GaitChoice) -> &'static str {
     match gait {
         GaitChoice::Dense => "dense",
         GaitChoice::Sampled10 => "sampled_10",
-        GaitChoice::Boulic => "boulic",
     }
 }
 

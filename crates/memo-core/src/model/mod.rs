@@ -26,7 +26,7 @@ pub use camera::{
 pub use camera_file::{CameraFileError, CameraFileOptions, FileFormat, LengthUnit, NearestLens, Place};
 pub use cylinder::EllipticCylinder;
 pub use distortion::Distortion;
-pub use gait::{GaitError, GaitStyle, Posture, SideAngles};
+pub use gait::{GaitStyle, Posture, SideAngles};
 pub use position::{
     FootPosition, Midpoints, PositionError, PositionOptions, height_on_ground, position_from_feet,
     position_from_head, position_from_rectangle, position_on_ground,

@@ -1,13 +1,11 @@
 //! Periodic cubic interpolation on the unit cycle.
 //!
-//! Source: Rohr 1994, section 3.2 (periodic cubic splines, after Schwarz 1986). The monotone variant after
-//! Fritsch and Butland 1984 is for curves given by their extremes (Boulic et al. 1990). Knots must be
-//! distinct modulo 1.
+//! Source: Rohr 1994, section 3.2 (periodic cubic splines, after Schwarz 1986).
 
-/// A cubic polynomial on each interval of the cycle, given by values and slopes at the knots (Hermite form).
+/// A cubic polynomial on each of equal intervals of the cycle, given by values and slopes at their starts (Hermite
+/// form). The first starts at phase 0.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PeriodicCubic {
-    knots: Vec<f64>,
     values: Vec<f64>,
     slopes: Vec<f64>,
 }
@@ -27,57 +25,17 @@ impl PeriodicCubic {
         let h = 1.0 / n as f64;
         let right: Vec<f64> =
             (0..n).map(|i| 3.0 * (samples[(i + 1) % n] - samples[(i + n - 1) % n]) / h).collect();
-        Self {
-            knots: (0..n).map(|i| i as f64 * h).collect(),
-            values: samples.to_vec(),
-            slopes: solve_cyclic_1_4_1(&right),
-        }
-    }
-
-    /// The periodic monotone cubic through (phase, value) control points: no overshoot between neighbours.
-    ///
-    /// The slope at a knot is the weighted harmonic mean of the neighbouring secants, 0 at an extreme
-    /// (Fritsch and Butland 1984, eq. 5).
-    ///
-    /// # Panics
-    /// With fewer than two points of distinct phase.
-    pub fn monotone(points: &[(f64, f64)]) -> Self {
-        let mut points: Vec<(f64, f64)> = points.iter().map(|&(p, y)| (p.rem_euclid(1.0), y)).collect();
-        points.sort_by(|a, b| a.0.total_cmp(&b.0));
-        points.dedup_by(|a, b| a.0 - b.0 < 1e-9);
-        let n = points.len();
-        assert!(n >= 2, "a periodic curve needs two distinct points, got {n}");
-        let width = |i: usize| {
-            let next = points[(i + 1) % n].0 + if i + 1 == n { 1.0 } else { 0.0 };
-            next - points[i].0
-        };
-        let secant = |i: usize| (points[(i + 1) % n].1 - points[i].1) / width(i);
-        let slopes = (0..n)
-            .map(|i| {
-                let before = (i + n - 1) % n;
-                let (d0, d1, h0, h1) = (secant(before), secant(i), width(before), width(i));
-                if d0 * d1 <= 0.0 {
-                    return 0.0;
-                }
-                let (w0, w1) = (2.0 * h1 + h0, h1 + 2.0 * h0);
-                (w0 + w1) / (w0 / d0 + w1 / d1)
-            })
-            .collect();
-        Self {
-            knots: points.iter().map(|p| p.0).collect(),
-            values: points.iter().map(|p| p.1).collect(),
-            slopes,
-        }
+        Self { values: samples.to_vec(), slopes: solve_cyclic_1_4_1(&right) }
     }
 
     /// The value at any phase (taken modulo 1).
     pub fn at(&self, phase: f64) -> f64 {
-        let phase = phase.rem_euclid(1.0);
-        let n = self.knots.len();
-        let i = (self.knots.partition_point(|&k| k <= phase) + n - 1) % n;
+        let n = self.values.len();
+        let (h, along) = (1.0 / n as f64, phase.rem_euclid(1.0) * n as f64);
+        // A phase just below 0 is rounded to 1.
+        let i = along as usize % n;
         let j = (i + 1) % n;
-        let h = (self.knots[j] - self.knots[i]).rem_euclid(1.0);
-        let t = (phase - self.knots[i]).rem_euclid(1.0) / h;
+        let t = along.fract();
         let (t2, t3) = (t * t, t * t * t);
         (2.0 * t3 - 3.0 * t2 + 1.0) * self.values[i]
             + (t3 - 2.0 * t2 + t) * h * self.slopes[i]
@@ -89,7 +47,6 @@ impl PeriodicCubic {
     #[must_use]
     pub fn affine(&self, factor: f64, offset: f64) -> Self {
         Self {
-            knots: self.knots.clone(),
             values: self.values.iter().map(|v| v * factor + offset).collect(),
             slopes: self.slopes.iter().map(|s| s * factor).collect(),
         }
@@ -144,37 +101,6 @@ mod tests {
         };
         let ratio = error(20) / error(40);
         assert!((14.0..18.0).contains(&ratio), "halving the spacing divides the error by 16, got {ratio}");
-    }
-
-    #[test]
-    fn monotone_curves_stay_between_their_control_points() {
-        let curve = PeriodicCubic::monotone(&[(-0.1, 25.0), (0.5, -15.0)]);
-        for i in 0..200 {
-            let y = curve.at(f64::from(i) / 200.0);
-            assert!((-15.0..=25.0).contains(&y));
-        }
-        assert!((curve.at(0.9) - 25.0).abs() < 1e-12 && (curve.at(1.5) + 15.0).abs() < 1e-12);
-    }
-
-    /// The slope at a knot between secants d0, d1 over h0, h1 is 3 (h0 + h1) divided by (2 h1 + h0) / d0 +
-    /// (h1 + 2 h0) / d1. SciPy 1.17.1 uses the same formula:
-    /// `x = np.array([0.1, 0.25, 0.6, 0.7]); y = np.array([2.0, 5.0, 6.0, 1.0])`
-    /// `PchipInterpolator(np.concatenate([x - 1, x, x + 1]), np.tile(y, 3))(t)`.
-    #[test]
-    fn monotone_curves_agree_with_scipy() {
-        let curve = PeriodicCubic::monotone(&[(0.6, 6.0), (0.1, 2.0), (-0.3, 1.0), (1.25, 5.0)]);
-        for (phase, expected) in [
-            (0.0, 1.5603530534351147),
-            (0.17, 3.3537476203939307),
-            (0.25, 5.0),
-            (0.4, 5.665694849368319),
-            (0.55, 5.978620019436345),
-            (0.65, 3.4999999999999956),
-            (0.8, 1.0617843511450382),
-            (0.95, 1.388388597328244),
-        ] {
-            assert!((curve.at(phase) - expected).abs() < 1e-12, "{phase}: {}", curve.at(phase));
-        }
     }
 
     /// SciPy 1.17.1: `CubicSpline(np.arange(11) / 10, np.append(y, y[0]), bc_type='periodic')(t)`.

@@ -26,8 +26,6 @@ pub(super) const MISSED_FRAMES: usize = 3;
 /// scenes, those who came near others were 0.36 to 0.88 as high. What was left over from two people alone was 0.16 to 0.26 as
 /// high; of three others it was up to 0.5, 0.8 and 0.9, so they are not told from newcomers by this.
 const NEWCOMER_SHARE: f64 = 0.35;
-/// Speed of a comfortable walk, used before the speed is known, m/s.
-pub(super) const COMFORTABLE_MPS: f64 = 1.3;
 /// A glance at a start looks at every such frame.
 const GLANCE_EVERY: usize = 3;
 /// A rectangle near somebody else that is lower than this share of the tallest one shows no feet. Strides and arms change
@@ -309,11 +307,9 @@ impl Entered {
         style: &GaitStyle,
         way: Way,
     ) -> Result<Self, Reason> {
-        let styled = |speed_mps: f64| {
-            let walker = given.options.walker(height.height_m, speed_mps).map_err(|_| Reason::WrongSize)?;
-            Ok::<_, Reason>(Walker { style: *style, ..walker })
-        };
-        let crown_m = styled(COMFORTABLE_MPS)?.level_crown_height_m();
+        let average = given.options.walker(height.height_m).map_err(|_| Reason::WrongSize)?;
+        let walker = Walker { style: *style, ..average };
+        let crown_m = walker.level_crown_height_m();
         let (camera, mut course) = course(sightings, given, crown_m, height)?;
         if way == Way::Oblique {
             let crown = Crown { height_m: crown_m, sd_m: height.sd_in_camera_m() };
@@ -327,7 +323,6 @@ impl Entered {
         if speed_mps >= FASTEST_MPS {
             return Err(Reason::TooFast { speed_mps });
         }
-        let walker = styled(speed_mps)?;
         Ok(Self { camera, course, walker })
     }
 

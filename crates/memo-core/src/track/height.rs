@@ -202,7 +202,7 @@ mod tests {
 
     /// Rectangles of a person with the crown of an average walker.
     fn sightings(camera: &Camera, height_m: f64) -> Vec<Sighting> {
-        let crown_m = TrackerOptions::default().walker(height_m, 1.3).unwrap().level_crown_height_m();
+        let crown_m = TrackerOptions::default().walker(height_m).unwrap().level_crown_height_m();
         (0..13)
             .map(|k| {
                 let foot = DVec3::new(-0.3 + 0.05 * f64::from(k), 0.4, 0.0);

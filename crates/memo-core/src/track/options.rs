@@ -19,21 +19,13 @@ pub enum GaitChoice {
     Dense,
     /// Ten samples per joint curve, as in the paper.
     Sampled10,
-    /// Boulic's formulas at the speed found by the starting phase: amplitude depends on speed.
-    Boulic,
 }
 
-impl GaitChoice {
-    /// The gait of a body at a speed; for Boulic's formulas the speed is clamped to the range they cover.
-    fn gait(self, body: &Body, speed_mps: f64) -> Gait {
-        match self {
-            Self::Dense => Gait::dense(),
-            Self::Sampled10 => Gait::sampled_10(),
-            Self::Boulic => {
-                let leg_m = body.leg_length_m();
-                let held = speed_mps.clamp(0.5 * leg_m, 3.0 * leg_m);
-                Gait::boulic(held, leg_m).unwrap_or_else(|_| Gait::dense())
-            }
+impl From<GaitChoice> for Gait {
+    fn from(choice: GaitChoice) -> Self {
+        match choice {
+            GaitChoice::Dense => Self::dense(),
+            GaitChoice::Sampled10 => Self::sampled_10(),
         }
     }
 }
@@ -150,10 +142,10 @@ impl TrackerOptions {
         EvidenceStream::new(self.evidence).steadied_by(self.steady.map(steadier))
     }
 
-    /// The average walker of a body height in metres; the gait is made for this speed, m/s.
-    pub fn walker(&self, height_m: f64, gait_speed_mps: f64) -> Result<Walker, BodyError> {
+    /// The average walker of a body height in metres.
+    pub fn walker(&self, height_m: f64) -> Result<Walker, BodyError> {
         let body = Body::from_height(height_m)?;
-        Ok(Walker { body, gait: self.gait.gait(&body, gait_speed_mps), style: GaitStyle::default() })
+        Ok(Walker { body, gait: self.gait.into(), style: GaitStyle::default() })
     }
 }
 
@@ -169,7 +161,7 @@ pub(super) fn start_height(
         (Some(height_m), _) => BodyHeight::given(height_m),
         (None, None) => population,
         (None, Some(camera)) => {
-            let average = options.walker(POPULATION_HEIGHT_M, 1.3);
+            let average = options.walker(POPULATION_HEIGHT_M);
             let seen = average.ok().and_then(|walker| from_rectangles(camera, sightings, &walker));
             seen.map_or(population, |seen| combined(&population, &seen))
         }

@@ -2,7 +2,7 @@
 
 use super::super::active::Active;
 use super::super::approach::Approach;
-use super::super::candidate::{COMFORTABLE_MPS, Given, course, feet_cut_off};
+use super::super::candidate::{Given, course, feet_cut_off};
 use super::super::decisions::MOST_APART_S;
 use super::super::evidence::Evidence;
 use super::super::fit::views::Piece;
@@ -162,7 +162,7 @@ impl Tracker {
             return Err(standing);
         }
         let height = approaching_height(options, self.given_height(person), camera, &sightings);
-        match options.walker(height.height_m, COMFORTABLE_MPS) {
+        match options.walker(height.height_m) {
             Ok(walker) => Approach { camera, height, walker, options }.begin(standing),
             Err(_) => Err(standing),
         }
@@ -176,7 +176,7 @@ impl Tracker {
         let (options, camera) = (&self.options, self.options.camera.as_ref());
         let height_m = self.given_height(person);
         let height = start_height(options, height_m, camera, sightings);
-        let walker = options.walker(height.height_m, COMFORTABLE_MPS).ok()?;
+        let walker = options.walker(height.height_m).ok()?;
         let given = Given { options, camera, tilt: self.tilt, scale_sd: 0.0, height_m, size };
         let crown_m = walker.level_crown_height_m();
         let usual = course(sightings, &given, crown_m, &height).ok();
