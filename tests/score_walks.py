@@ -1,6 +1,6 @@
 """Tracks every drawn walk through `memo.track` and tables its errors against the truth beside the video.
 
-    python tests/score_walks.py [--only PATTERN] [--out NOW.json] [--before EARLIER.json]
+    python tests/score_walks.py [--only PATTERN] [--shrink N] [--out NOW.json] [--before EARLIER.json]
 
 One row per clip, then pooled rows for the people that memo is tuned on and for the others. Errors are
 tracked minus true. Angles are those of `truth.joint_angles_deg`, of the tracked joints as of the true ones,
@@ -103,6 +103,8 @@ class Swap:
 
     probability: float
     is_swapped: bool
+    verdict: str = ""
+    """On the fit: `well`, `in part`, `poorly`, or empty without one."""
 
 
 @dataclass(frozen=True)
@@ -206,11 +208,12 @@ def score(
     true_events: gt.Columns,
     camera_m: Sequence[float],
     mean_sds: Sequence[Mapping[str, float]] = (),
+    verdicts: Sequence[str] = (),
 ) -> ClipScore:
     """The figures of a track: its columns, its events and its gait parameters against those of the truth.
 
     `camera_m` is where the camera stands, world x and y; `mean_sds` are the standard deviations of the means
-    over each walk, none if nothing is stated.
+    over each walk, none if nothing is stated; `verdicts` are those on the fits of the walks.
     """
     true = true_gait(truth, true_events)
     common: dict[str, Any] = {
@@ -251,7 +254,7 @@ def score(
         name,
         coverage=in_truth.size / truth["frame"].size,
         walks=np.unique(track["walk"]).size,
-        swaps=_swaps(here, phase),
+        swaps=_swaps(here, phase, verdicts),
         rms_deg={joint: _both_sides_rms(errors_deg, joint, centred=False) for joint in JOINTS},
         centred_deg={joint: _both_sides_rms(errors_deg, joint, centred=True) for joint in JOINTS},
         along_m=_rms(place["along_m"]),
@@ -281,7 +284,7 @@ def _away(truth: gt.Columns, forward: np.ndarray, camera_m: Sequence[float]) -> 
     return across if seen @ across[:2] >= 0.0 else -across
 
 
-def _swaps(track: gt.Columns, phase_error: np.ndarray) -> tuple[Swap, ...]:
+def _swaps(track: gt.Columns, phase_error: np.ndarray, verdicts: Sequence[str]) -> tuple[Swap, ...]:
     """Per walk, the stated probability that the sides are exchanged, and whether they are."""
     swaps = []
     for walk in np.unique(track["walk"]):
@@ -289,7 +292,8 @@ def _swaps(track: gt.Columns, phase_error: np.ndarray) -> tuple[Swap, ...]:
         known = phase_error[rows & np.isfinite(phase_error)]
         if known.size:
             is_swapped = bool(np.mean(np.abs(known) > 0.25) > 0.5)
-            swaps.append(Swap(float(np.median(track["p_swapped"][rows])), is_swapped))
+            verdict = verdicts[int(walk)] if verdicts else ""
+            swaps.append(Swap(float(np.median(track["p_swapped"][rows])), is_swapped, verdict))
     return tuple(swaps)
 
 
@@ -446,12 +450,12 @@ def gait_intervals(
 # From the video
 
 
-def track_clip(clip: Clip) -> ClipScore:
+def track_clip(clip: Clip, shrink: int = 1) -> ClipScore:
     """Tracks a clip, given its camera and the walker's height, and scores it."""
     import memo
 
     camera = memo.Camera.from_toml(clip.folder / "camera.toml")
-    found = track_video(clip.folder / "video.mp4", clip.height_m, camera)
+    found = track_video(clip.folder / "video.mp4", clip.height_m, camera.shrunk(shrink), shrink=shrink)
     return score(
         clip.name,
         found.columns,
@@ -461,6 +465,7 @@ def track_clip(clip: Clip) -> ClipScore:
         gt.read_columns(clip.folder / "events.csv"),
         camera.position,
         [walk.fit.mean_sd if walk.fit else {} for walk in found.walks],
+        [walk.fit.verdict if walk.fit else "" for walk in found.walks],
     )
 
 
@@ -477,13 +482,13 @@ def track_demo(folder: Path) -> DemoScore:
 
 
 def track_video(
-    video: Path, height_m: float | None, camera: Any, start: int = 0, stop: int | None = None
+    video: Path, height_m: float | None, camera: Any, start: int = 0, stop: int | None = None, shrink: int = 1
 ) -> Any:
     """`memo.track` of the frames of a video."""
     import memo
     from memo.video import VideoReader
 
-    with VideoReader(video, start=start, stop=stop) as reader:
+    with VideoReader(video, start=start, stop=stop, shrink=shrink) as reader:
         frames = [(frame.luma.copy(), frame.time_s) for frame in reader]
     lumas, times_s = zip(*frames, strict=True)
     return memo.track(lumas, height_m=height_m, times_s=times_s, camera=camera)
@@ -879,7 +884,7 @@ def shared_clips() -> list[Clip]:
 
 
 def _run(
-    clips: Sequence[Clip], with_demo: bool, workers: int
+    clips: Sequence[Clip], with_demo: bool, workers: int, shrink: int
 ) -> tuple[list[ClipScore], DemoScore | None, bool]:
     """The scores, and whether any clip failed; one line of progress per clip."""
     # The tracker has threads of its own: a forked copy of them would wait for ever.
@@ -889,7 +894,7 @@ def _run(
     failed = False
     started = time.monotonic()
     with ProcessPoolExecutor(workers, mp_context=context) as pool:
-        jobs: dict[Any, str] = {pool.submit(track_clip, clip): clip.name for clip in clips}
+        jobs: dict[Any, str] = {pool.submit(track_clip, clip, shrink): clip.name for clip in clips}
         if with_demo:
             jobs[pool.submit(track_demo, SHARED_DATA / "video" / DEMO)] = DEMO
         for done, job in enumerate(as_completed(jobs), start=1):
@@ -917,17 +922,20 @@ def main() -> int:
     parser.add_argument(
         "--before", type=Path, metavar="FILE.json", help="numbers of an earlier run, to compare"
     )
+    parser.add_argument(
+        "--shrink", type=int, default=1, metavar="N", help="N x N pixels of the clips become one"
+    )
     parser.add_argument("--workers", type=int, default=2)
     args = parser.parse_args()
     chosen = re.compile(args.only)
     clips = [
         clip for clip in (clips_of(args.clips) if args.clips else shared_clips()) if chosen.search(clip.name)
     ]
-    with_demo = args.clips is None and bool(chosen.search(DEMO))
+    with_demo = args.clips is None and args.shrink == 1 and bool(chosen.search(DEMO))
     if not clips and not with_demo:
         parser.error(f"no clip's name has {args.only!r}")
     before, demo_before = read_stored(args.before) if args.before else ([], None)
-    scores, demo, failed = _run(clips, with_demo, args.workers)
+    scores, demo, failed = _run(clips, with_demo, args.workers, args.shrink)
     print(report(scores, demo, before, demo_before))
     if args.out:
         from memo.files import write_json

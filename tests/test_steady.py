@@ -85,6 +85,8 @@ def test_a_slow_zoom_is_reported():
         (["still"] * 2 + ["unknown"] * 18, True),
         (["still", "turned"] * 5 + ["unknown"] * 10, True),
         (["still"] * 19 + ["turned"], False),
+        (["uneven_light"] * 20, False),
+        (["uneven_light"] * 10 + ["unknown"] * 10, True),
     ],
 )
 def test_frames_that_no_turn_explains_are_reported(states, is_reported):
@@ -93,6 +95,9 @@ def test_frames_that_no_turn_explains_are_reported(states, is_reported):
         for k, state in enumerate(states)
     ]
     motion = CameraMotion(rows)
+    uneven = states.count("uneven_light")
+    light = f"In {uneven} frames of 20 the light is another one from place to place"
+    assert any(sentence.startswith(light) for sentence in motion.sentences) == bool(uneven)
     said = [sentence for sentence in motion.sentences if "the camera did more than turn" in sentence]
     assert motion.is_unexplained == is_reported and len(said) == is_reported
     turned = states.count("turned")
@@ -109,6 +114,7 @@ def test_frames_that_no_turn_explains_are_reported(states, is_reported):
         (["still"] * 20, [], "still"),
         (["still", "turned"] * 10, [], "steadied"),
         (["turned"] * 10 + ["unknown"] * 10, [], "beyond"),
+        (["uneven_light"] * 20, [], "still"),
         (["still"] * 20, [SimpleNamespace(frame=3, reason="cut")], "beyond"),
     ],
 )

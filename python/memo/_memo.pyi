@@ -378,7 +378,7 @@ class FrameMotion:
 
     frame: Final[int]
     state: Final[str]
-    """"still", "turned", "unknown" or "lost"."""
+    """"still", "turned", "uneven_light", "unknown" or "lost"."""
     turn_rad: Final[list[float]]
     """Rotation vector from the first frame's camera to this one's, camera axes."""
     shift_px: Final[float]

@@ -443,9 +443,10 @@ def write_tables(recorded: Recorded, out: Path) -> None:
         write_gait_parameters_csv(gait, recorded.gait_parameters)
         write_cycles_csv(cycles, recorded.cycles)
         written = [table, events, gait, cycles, write_run(new, recorded, *recorded.run)]
-        if recorded.camera_motion.moved or recorded.camera_motion.is_unexplained:
+        motion = recorded.camera_motion
+        if motion.moved or motion.is_unexplained or motion.is_unevenly_lit:
             written.append(new / "camera_motion.csv")
-            write_camera_motion_csv(written[-1], recorded.camera_motion)
+            write_camera_motion_csv(written[-1], motion)
         for stale in _DRAWN:  # from an earlier run: they do not match the new tables
             (out / stale).unlink(missing_ok=True)
         recorded.written = [path.replace(out / path.name) for path in written]

@@ -15,7 +15,7 @@ result! {
     FrameMotion |_py, motion: &CameraMotion| {
         /// Number of the frame, from 0.
         frame: usize,
-        /// "still", "turned", "unknown" or "lost".
+        /// "still", "turned", "uneven_light", "unknown" or "lost".
         state: String = motion.state.name(),
         /// Rotation vector from the first frame's camera to this one's, radians, camera axes.
         turn_rad: [f64; 3] = motion.turn_rad.to_array(),

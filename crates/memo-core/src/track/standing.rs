@@ -9,6 +9,8 @@ use std::collections::BTreeMap;
 
 /// What stays is forgotten after this many consecutive frames without it.
 const MISSED_FRAMES: usize = 3;
+/// What changes where the thing was in so many last frames is the thing, at the usual rate.
+const RECENT_FRAMES: usize = 12;
 
 /// Frames in which something stays in one place.
 #[derive(Debug, Clone, Default)]
@@ -54,10 +56,14 @@ impl Standing {
         standing
     }
 
-    /// How much of a rectangle is where the thing was last seen; `None` if it is elsewhere.
+    /// How much of a rectangle is where the thing was last seen; `None` if it is elsewhere. Of somebody who comes nearer, now
+    /// this and now that part changes.
     pub(super) fn overlap(&self, rectangle: &Rectangle) -> Option<f64> {
         let last = last_rectangle(&self.kept)?;
-        (last.gap(rectangle) == [0, 0]).then(|| last.sides(0.0).overlap(&rectangle.sides(0.0)))
+        let recent = self.kept.iter().rev().take(lasting(RECENT_FRAMES, self.every_s()));
+        let seen = recent.filter_map(|(sighting, _)| Some(sighting.as_ref()?.rectangle));
+        let lately = seen.fold(last, |all, one| all.union(&one));
+        (lately.gap(rectangle) == [0, 0]).then(|| last.sides(0.0).overlap(&rectangle.sides(0.0)))
     }
 
     /// True if it was not seen in too many frames before this one.

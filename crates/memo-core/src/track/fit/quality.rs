@@ -2,7 +2,7 @@
 
 use super::super::decisions::{
     LEAST_OF_SMALL_PX, MOST_MISSED, MOST_MISSED_OF_SMALL, MOST_RESIDUAL, MOST_RESIDUAL_PX, MOST_SOLE_M,
-    POORLY_CROWN, POORLY_MISSED, POORLY_OFF, WELL_LENGTH_SD, WELL_MISSED,
+    POORLY_CROWN, POORLY_MISSED, POORLY_OFF, POORLY_SWAPPED, WELL_LENGTH_SD, WELL_MISSED,
 };
 use crate::model::body::{PART_COUNT, Part};
 
@@ -90,6 +90,12 @@ impl FitQuality {
         }
     }
 
+    /// The probability that the sides are exchanged, by what the fits with either sides show: a model that is beside the person
+    /// shows less.
+    pub(super) fn p_swapped(&self, by_fits: f64) -> f64 {
+        if self.verdict() == FitVerdict::Poorly { by_fits.max(POORLY_SWAPPED) } else { by_fits }
+    }
+
     /// Where the model is off: the parts that miss as much of their outline as makes a whole fit a poor one, or are as far
     /// from their edges and at least a pixel, and more than the outline as a whole. Those that lower the fit most come
     /// first.
@@ -169,7 +175,10 @@ mod tests {
         assert_eq!(verdict(GOOD), "well");
         assert_eq!(verdict(FitQuality { missed: 0.03, ..GOOD }), "in part");
         assert_eq!(verdict(FitQuality { worst_length_sd: 3.1, ..GOOD }), "in part");
-        assert_eq!(verdict(FitQuality { missed: 0.11, ..GOOD }), "poorly");
+        let poor = FitQuality { missed: 0.11, ..GOOD };
+        assert_eq!(verdict(poor), "poorly");
+        assert_eq!([1e-3, 0.3].map(|p| poor.p_swapped(p)), [POORLY_SWAPPED, 0.3]);
+        assert_eq!(GOOD.p_swapped(1e-3), 1e-3);
         assert_eq!(verdict(FitQuality { residual_px: 1.5, ..GOOD }), "poorly");
         for off in [0.04, -0.04] {
             assert_eq!(verdict(FitQuality { crown_off: Some(off), ..GOOD }), "poorly");

@@ -9,7 +9,8 @@
 //!    is chained with that of the key frame before.
 //! 4. If a frame and those after it agree with each other but not with the key frames, the shot has changed. If the focal
 //!    length changes, the picture is zoomed. Both end the view ([`Loss`]).
-//! 5. A rotation stands only if the camera of the first frame, unmoved, does not explain more: before faint texture it would
+//! 5. A frame that no rotation explains, but whose parts look as in the first frame, only brighter or darker, is lit unevenly.
+//! 6. A rotation stands only if the camera of the first frame, unmoved, does not explain more: before faint texture it would
 //!    creep along with a person who has more of it.
 //!
 //! Limits: the camera only rotates. A camera that is carried along changes the perspective: near a wall it cannot be told
@@ -99,6 +100,8 @@ pub enum CameraState {
     Still,
     /// Turned: the frame was steadied.
     Turned,
+    /// Where it was in the first frame, but the light is another one from place to place: the frame was left as it is.
+    UnevenLight,
     /// Too little in the picture shows a rotation: the frame got the rotation of the one before.
     Unknown,
     /// The view has ended (see [`Loss`]); the frame was not used.
@@ -112,6 +115,7 @@ impl CameraState {
         match self {
             Self::Still => "still",
             Self::Turned => "turned",
+            Self::UnevenLight => "uneven_light",
             Self::Unknown => "unknown",
             Self::Lost => "lost",
         }
@@ -209,6 +213,14 @@ const CUT_GREY: i32 = 12;
 /// The same of pictures that look much alike. Six drawn cuts between brick rooms change 0.47 to 0.61 of the picture by more,
 /// and somebody who walks there 0.04.
 const ALIKE_GREY: i32 = 6;
+/// Squares of this side, pixels, whose grey levels scatter by at least so many, show whether two pictures are alike: their
+/// correlation, which no gain and no offset changes, is then at least so large.
+const ALIKE_CELL_PX: usize = 16;
+const ALIKE_SCATTER: f64 = 4.0;
+const ALIKE_CORRELATION: f64 = 0.8;
+/// So many of them are alike if only the light differs. Under lamps that flicker in bands or in a part of the picture 0.47 to 1.00
+/// are, and of frames after a motion of the camera, a zoom or a cut up to 0.20, and 0.48 of a cut that keeps half of the room.
+const ALIKE_SHARE: f64 = 0.35;
 /// Frames in which a zoom must be seen.
 const ZOOM_FRAMES: usize = 4;
 /// A frame that shares less than this with the key frame becomes a key frame, and one of several that support it less.
@@ -322,18 +334,30 @@ impl Steadier {
         let pyramid = Pyramid::new(*frame, levels(frame));
         if self.view.is_none() {
             self.open(frame, &pyramid);
-            let support = self.view.as_ref().map(|_| 1.0);
-            return Ok(self.noted(number, support, frame));
+            let found = if self.view.is_some() { CameraState::Still } else { CameraState::Unknown };
+            let support = if self.view.is_some() { 1.0 } else { f64::NAN };
+            return Ok(self.noted(number, found, support, frame));
         }
-        let found = self.compared(&pyramid);
-        match found {
-            Some((key, estimate)) => self.follow(number, key, &estimate, &pyramid),
+        let (found, support) = match self.compared(&pyramid) {
+            Some((key, estimate)) => {
+                self.follow(number, key, &estimate, &pyramid);
+                (CameraState::Turned, estimate.support)
+            }
+            None if self.is_lit_unevenly(frame) => (CameraState::UnevenLight, f64::NAN),
             None => {
                 self.unexplained += 1;
                 self.look_for_another_shot(number, frame, &pyramid);
+                (CameraState::Unknown, f64::NAN)
             }
-        }
-        Ok(self.noted(number, found.map(|(_, estimate)| estimate.support), frame))
+        };
+        Ok(self.noted(number, found, support, frame))
+    }
+
+    /// True of a frame of the camera that has not moved, in which the light differs from place to place.
+    fn is_lit_unevenly(&self, frame: &Frame<'_>) -> bool {
+        let is_unmoved = |view: &&View| displacement_px(&view.camera, &self.last)[0] < self.options.still_px;
+        let view = self.view.as_ref().filter(|_| !self.is_lost).filter(is_unmoved);
+        view.is_some_and(|view| alike_share(&view.picture.as_frame(), frame) >= ALIKE_SHARE)
     }
 
     /// Where a pixel of a frame is in the camera of the first frame; the same pixel if the frame was left as it is.
@@ -539,21 +563,19 @@ impl Steadier {
         }
     }
 
-    /// Records the camera in a frame and steadies the frame.
-    fn noted(&mut self, number: usize, support: Option<f64>, frame: &Frame<'_>) -> Steadied {
+    /// Records the camera in a frame, of which `found` says whether its rotation is known, and steadies the frame.
+    fn noted(&mut self, number: usize, found: CameraState, support: f64, frame: &Frame<'_>) -> Steadied {
         let shift_px = self.view.as_ref().map_or([0.0; 2], |view| displacement_px(&view.camera, &self.last));
         let is_moved = shift_px[0].is_nan() || shift_px[0] >= self.options.still_px;
-        let state = match support {
+        let state = match found {
             _ if self.is_lost => CameraState::Lost,
-            None => CameraState::Unknown,
-            Some(_) if is_moved => CameraState::Turned,
-            Some(_) => CameraState::Still,
+            CameraState::Turned if !is_moved => CameraState::Still,
+            _ => found,
         };
         let turn_rad = if is_moved && !self.is_lost { vector(&self.last) } else { DVec3::ZERO };
         if self.motions.len() == MOST_MOTIONS {
             self.motions.pop_front();
         }
-        let support = support.unwrap_or(f64::NAN);
         self.motions.push_back(CameraMotion { frame: number, state, turn_rad, shift_px, support });
         match &self.view {
             _ if self.is_lost => Steadied::Lost,
@@ -574,6 +596,35 @@ fn changed_share(a: &Image<u8>, b: &Frame<'_>, grey: i32) -> f64 {
     let median = *differences.select_nth_unstable(middle).1;
     let far = differences.iter().filter(|d| (*d - median).abs() > grey).count();
     far as f64 / differences.len() as f64
+}
+
+/// Of the squares of a picture that have texture, the share that looks alike in another one but for gain and offset; 0 of a
+/// picture without texture.
+fn alike_share(a: &Frame<'_>, b: &Frame<'_>) -> f64 {
+    let side = ALIKE_CELL_PX;
+    let cells = (0..a.height() / side).flat_map(|row| (0..a.width() / side).map(move |column| (row, column)));
+    let correlation = |(row, column): (usize, usize)| {
+        let columns = column * side..(column + 1) * side;
+        let ([mut sums, mut squares], mut product) = ([[0.0; 2]; 2], 0.0);
+        for y in row * side..(row + 1) * side {
+            for (a, b) in a.row(y)[columns.clone()].iter().zip(&b.row(y)[columns.clone()]) {
+                let levels = [a, b].map(|level| f64::from(*level));
+                for (k, level) in levels.into_iter().enumerate() {
+                    sums[k] += level;
+                    squares[k] += level * level;
+                }
+                product += levels[0] * levels[1];
+            }
+        }
+        let count = (side * side) as f64;
+        let variance = [0, 1].map(|k| squares[k] / count - (sums[k] / count).powi(2));
+        let covariance = product / count - sums[0] * sums[1] / (count * count);
+        (variance[0] >= ALIKE_SCATTER.powi(2))
+            .then(|| covariance / (variance[0] * variance[1].max(1e-9)).sqrt())
+    };
+    let correlations: Vec<f64> = cells.filter_map(correlation).collect();
+    let alike = correlations.iter().filter(|correlation| **correlation >= ALIKE_CORRELATION).count();
+    alike as f64 / correlations.len().max(1) as f64
 }
 
 /// Number of levels of a picture.

@@ -251,6 +251,29 @@ fn a_black_frame_is_no_cut() {
     assert!(steadier.losses().is_empty() && steadier.take_loss().is_none());
 }
 
+/// A lamp that flickers while the rows are read brightens and darkens bands of them. A turned camera is not taken for that.
+#[test]
+fn bands_of_light_are_no_motion() {
+    let camera = camera();
+    let lit = |shot: Shot, phase: f64| {
+        let mut picture = shot.plain();
+        for y in 0..picture.height() {
+            let gain = 1.0 + 0.45 * (y as f64 / 12.0 + phase).sin();
+            picture.row_mut(y).iter_mut().for_each(|grey| *grey = (gain * f64::from(*grey)) as u8);
+        }
+        picture
+    };
+    let mut steadier = steadier(Some(&camera));
+    pushed(&mut steadier, &Shot::of(&camera, [0.0; 3]).plain());
+    for phase in [0.0, 2.0, 4.0] {
+        let (steadied, motion) = pushed(&mut steadier, &lit(Shot::of(&camera, [0.0; 3]), phase));
+        assert_eq!((steadied, motion.state), (Steadied::AsGiven, CameraState::UnevenLight), "{phase}");
+    }
+    let (_, motion) = pushed(&mut steadier, &lit(Shot::of(&camera, [0.0, 0.03, 0.0]), 1.0));
+    assert!(matches!(motion.state, CameraState::Turned | CameraState::Unknown), "{motion:?}");
+    assert!(steadier.losses().is_empty());
+}
+
 /// What is left of a view is where it was, also in a frame in which nobody knows how the camera turned.
 #[test]
 fn places_are_turned_back_in_an_unknown_frame_too() {

@@ -210,7 +210,13 @@ impl Tracker {
             Some(spot) => spot.begin(standing),
             None => Err(standing),
         };
-        match begun.or_else(|standing| self.begun_along_the_sight(standing, size, person)) {
+        // Where others reach into the region, the lowest rows are not those of its feet.
+        let shared = active.kept.iter().filter(|(_, edges)| edges.shared).count();
+        let along_the_sight = |standing| match 4 * shared <= active.kept.len() {
+            true => self.begun_along_the_sight(standing, size, person),
+            false => Err(standing),
+        };
+        match begun.or_else(along_the_sight) {
             Ok(begun) => Active { person, known_frame: active.known_frame, ..begun },
             Err(_) => active,
         }

@@ -153,7 +153,7 @@ impl Problem<'_> {
             mean_sd,
             frames: all,
             contacts,
-            p_swapped,
+            p_swapped: quality.p_swapped(p_swapped),
             mirrored: None,
             belt,
             quality,
