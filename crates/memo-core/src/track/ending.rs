@@ -232,14 +232,15 @@ mod tests {
         assert!(!ending(40, 1.2, 0.9, 0.5).is_over());
         assert!(!steady(-1.2, -0.9).is_over(), "backwards");
         assert!(ending(40, 0.0, 0.0, 0.5).is_over());
-        // A person who stands still or glides no longer walks: 0.25 m/s, 0.3 Hz, of the legs for twice as long.
+        // A person who stands still or glides no longer walks: 0.25 m/s, 0.3 Hz, of the legs for three times as long.
         for (last, speed_mps, rate_hz, is_over) in [
             (12, 0.24, 0.9, true),
             (12, 0.26, 0.9, false),
             (12, 1.2, 0.0, false),
-            (24, 1.2, 0.29, true),
-            (24, 1.2, 0.31, false),
-            (24, -0.26, -0.31, false),
+            (24, 1.2, 0.0, false),
+            (36, 1.2, 0.29, true),
+            (36, 1.2, 0.31, false),
+            (36, -0.26, -0.31, false),
         ] {
             let walk = ending_in(last, 40, [speed_mps, rate_hz], 0.5);
             assert_eq!(walk.is_over(), is_over, "{last}, {speed_mps}, {rate_hz}");

@@ -153,6 +153,24 @@ mod tests {
     }
 
     #[test]
+    fn a_part_belongs_to_what_was_there_lately() {
+        let Rectangle { left, right, .. } = WINDOW;
+        let [head, legs] = [(10, 30), (120, 180)].map(|(top, bottom)| Rectangle { left, top, right, bottom });
+        let frame = |standing: Standing, number: usize| {
+            let rectangle = if number == 0 { head.union(&legs) } else { legs };
+            let time_s = 0.04 * number as f64;
+            let edges = FrameEdges::of_one_alone(number, time_s, head.union(&legs), Vec::new());
+            standing.with(Some(Sighting { time_s, rectangle }), None, edges, None)
+        };
+        let seen = |frames: usize| (0..frames).fold(Standing::default(), frame).overlap(&head);
+        assert_eq!(
+            [seen(1).map(|overlap| overlap > 0.0), seen(5).map(|o| o > 0.0)],
+            [Some(true), Some(false)]
+        );
+        assert_eq!(seen(13), None, "too long ago");
+    }
+
+    #[test]
     fn frames_from_before_a_gap_are_dropped() {
         let there = |frames: std::ops::Range<usize>| frames.map(|frame| (frame, true));
         assert_eq!(kept(there(0..3).chain(there(5..7))), [0, 1, 2, 5, 6]);

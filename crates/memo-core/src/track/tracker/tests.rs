@@ -934,11 +934,20 @@ fn who_begins_again_on_the_spot_keeps_the_height() {
     }
 }
 
-/// What was begun across the picture, as arms and shadows may look, while its feet go along the line of sight or across it.
+/// What was begun across the picture, as arms and shadows may look, while its feet go along the line of sight or across it; where
+/// others reach into its region, the lowest rows may be theirs.
 #[test]
 fn a_walk_whose_feet_go_along_the_line_of_sight_begins_again_there() {
     let across = |time_s: f64| MIDDLE + towards().perp() * (SPEED_MPS * time_s - 1.2);
-    for (seen, is_along) in [(standing(66, feet_of_steps), true), (standing(66, across), false)] {
+    let beside = |from: usize| {
+        let mut seen = standing(66, feet_of_steps);
+        seen.kept[from..].iter_mut().for_each(|(_, edges)| edges.shared = true);
+        seen
+    };
+    let alone = standing(66, feet_of_steps);
+    for (seen, is_along) in
+        [(alone, true), (beside(56), true), (beside(50), false), (standing(66, across), false)]
+    {
         let tracker = tracker();
         let steps = (0..66).map(|k| step(k, 0.05 * k as f64, 1.2)).collect();
         // The first frames are those from before the walk.
