@@ -787,11 +787,12 @@ def asymmetry_lines(clips: Sequence[ClipScore], before: Sequence[ClipScore]) -> 
 
 def swap_table(clips: Sequence[ClipScore]) -> str:
     """One line per band of probabilities: the mean of those stated, and how often it was so."""
-    lines = [["stated", "walks", "mean", "exchanged"]]
+    lines = [["stated", "walks", "mean", "exchanged", "poor fits", "exchanged"]]
     for band, swaps in swap_bands(clips):
         stated = np.array([swap.probability for swap in swaps])
-        exchanged = sum(swap.is_swapped for swap in swaps)
-        lines.append([band, f"{len(swaps)}", _number(_mean(stated), 3), f"{exchanged}"])
+        poor = [swap.is_swapped for swap in swaps if swap.verdict == "poorly"]
+        counts = [sum(swap.is_swapped for swap in swaps), len(poor), sum(poor)]
+        lines.append([band, f"{len(swaps)}", _number(_mean(stated), 3), *map(str, counts)])
     return _aligned(lines)
 
 

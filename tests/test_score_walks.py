@@ -395,15 +395,20 @@ def test_clips_have_a_person_and_a_group(name, person, people, group):
 
 
 def test_stated_probabilities_stand_beside_how_often_sides_are_exchanged():
-    swaps = (sw.Swap(0.0, False), sw.Swap(0.02, True), sw.Swap(0.3, True), sw.Swap(1.0, False))
+    swaps = (
+        sw.Swap(0.0, False),
+        sw.Swap(0.02, True, "poorly"),
+        sw.Swap(0.3, True),
+        sw.Swap(1.0, False, "poorly"),
+    )
     clip = sw.ClipScore("ANTO__x", 1.0, 4, swaps=swaps)
     lines = [line.split() for line in sw.swap_table([clip, clip]).splitlines()[1:]]
     assert lines == [
-        ["0.00-0.02", "4", "0.010", "2"],
-        ["0.02-0.10", "0", "-", "0"],
-        ["0.10-0.20", "0", "-", "0"],
-        ["0.20-0.35", "2", "0.300", "2"],
-        ["0.35-1.00", "2", "1.000", "0"],
+        ["0.00-0.02", "4", "0.010", "2", "2", "2"],
+        ["0.02-0.10", "0", "-", "0", "0", "0"],
+        ["0.10-0.20", "0", "-", "0", "0", "0"],
+        ["0.20-0.35", "2", "0.300", "2", "0", "0"],
+        ["0.35-1.00", "2", "1.000", "0", "2", "0"],
     ]
     assert clip.sides == (1, 1, 2)
 
