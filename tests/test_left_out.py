@@ -136,8 +136,8 @@ def test_only_the_longest_are_told():
     def seen(frames, reason):
         return LeftOut(0, frames - 1, 0.0, 0.04 * frames, frames, np.ones((1, 5), int), reason, 1.0)
 
-    reasons = ["cut off", "too small", "wrong size", "too wide", "too slow", "too fast", "not walking"]
-    reasons += ["too brief", "beside somebody", "too many", "over ground"]
+    reasons = ["cut off", "too small", "wrong size", "other height", "too wide", "too slow"]
+    reasons += ["too fast", "not walking", "too brief", "beside somebody", "too many", "over ground"]
     left_out = [seen(10 + k, reason) for k, reason in enumerate(reasons)]
     said = left_out_sentences(left_out, 120)
     assert said[0] == "120 moving people or things were not followed. The 3 seen longest:"

@@ -44,6 +44,8 @@ pub(super) struct Active {
     pub(super) tilt: Option<TiltEstimate>,
     /// The body height with which the walk started.
     pub(super) height: BodyHeight,
+    /// The body height that the first rectangles show in a calibrated camera, if another one was given, metres.
+    pub(super) shown_height_m: Option<f64>,
     pub(super) depth_sd_m: f64,
     pub(super) start: StartReport,
     pub(super) walk: Walk,
@@ -85,6 +87,7 @@ impl Active {
             camera,
             tilt: None,
             height,
+            shown_height_m: None,
             depth_sd_m: 0.0,
             average: Walker { style: GaitStyle::default(), ..walk.walker.clone() },
             start,
@@ -279,6 +282,7 @@ impl Active {
             tilt: self.tilt.as_ref(),
             average: &self.average,
             height: &self.height,
+            shown_height_m: self.shown_height_m,
             is_on_treadmill: self.is_on_treadmill,
             depth_sd_m: self.depth_sd_m,
             filter: &options.walk.filter,

@@ -12,7 +12,7 @@ use super::locate::{
     Course, Crown, LocateError, Sighting, camera_from_sightings, locate, locate_slanting, same_person,
 };
 use super::options::TrackerOptions;
-use super::options::start_height;
+use super::options::{shown_height, start_height};
 use super::rate::{lasting, mean_interval_s};
 use super::start::{StartReport, StartSearch};
 use super::walk::{FrameEdges, Walk};
@@ -26,6 +26,8 @@ pub(super) const MISSED_FRAMES: usize = 3;
 /// scenes, those who came near others were 0.36 to 0.88 as high. What was left over from two people alone was 0.16 to 0.26 as
 /// high; of three others it was up to 0.5, 0.8 and 0.9, so they are not told from newcomers by this.
 const NEWCOMER_SHARE: f64 = 0.35;
+/// A start that failed is put down to a given height that is farther from that of the rectangles, standard deviations.
+const OTHER_HEIGHT_SD: f64 = 2.0;
 /// A glance at a start looks at every such frame.
 const GLANCE_EVERY: usize = 3;
 /// A rectangle near somebody else that is lower than this share of the tallest one shows no feet. Strides and arms change
@@ -167,12 +169,16 @@ impl Candidate {
                 Entered::new(&sightings, given, &height, &GaitStyle::default(), Way::Across)?;
             return Err(Reason::OverGround { speed_mps: course.speed_mps });
         }
-        let Started { camera, course, walker, start } = self.started_any_way(&sightings, given, &height)?;
+        let shown_height = shown_height_of(&sightings, given);
+        let started = self.started_any_way(&sightings, given, &height);
+        let Started { camera, course, walker, start } =
+            started.map_err(|reason| by_height(reason, &height, shown_height))?;
         let walk = Walk::new(walker, start.path, start.beginning);
         let walk = walk.through(self.seen.iter().map(|seen| &seen.edges), &camera, &options.walk);
         Ok(Active {
             tilt: given.tilt,
             depth_sd_m: course.depth_sd_m,
+            shown_height_m: shown_height.map(|shown| shown.height_m),
             kept: self.seen.iter().map(|seen| (Some(seen.sighting), seen.edges.clone())).collect(),
             pieces: self.seen.iter().filter_map(|seen| seen.piece.clone()).collect(),
             ..Active::new(walk, start, camera, height)
@@ -268,6 +274,24 @@ impl Candidate {
             .filter(|other| similarity(other) > OTHER_GAIT_GAIN * similarity(&average))
             .max_by(|a, b| similarity(a).total_cmp(&similarity(b)));
         other.or_else(|| average.walks().then_some(average)).ok_or(Reason::NotWalking)
+    }
+}
+
+/// The height that the rectangles of somebody show in a calibrated camera, whatever height was given.
+fn shown_height_of(sightings: &[Sighting], given: &Given<'_>) -> Option<BodyHeight> {
+    let camera = given.options.camera.as_ref().filter(|_| given.height_m.is_some())?;
+    shown_height(given.options, camera, sightings)
+}
+
+/// Why no walk fits, if it is that the rectangles show another height than the given one.
+fn by_height(reason: Reason, given: &BodyHeight, shown: Option<BodyHeight>) -> Reason {
+    match (reason, shown) {
+        (Reason::WrongSize | Reason::NotWalking, Some(shown))
+            if given.distance_sd(&shown) > OTHER_HEIGHT_SD =>
+        {
+            Reason::OtherHeight { shown_m: shown.height_m }
+        }
+        _ => reason,
     }
 }
 
@@ -590,6 +614,18 @@ pub(super) mod tests {
     }
 
     /// After a refused start, the next one has the latest frames and, once they show a path, the older ones too.
+    #[test]
+    fn a_start_fails_by_its_height_if_the_rectangles_show_another_one() {
+        let shown = |height_m| Some(BodyHeight { sd_m: 0.05, ..BodyHeight::given(height_m) });
+        let given = BodyHeight::given(1.5);
+        assert_eq!(by_height(Reason::NotWalking, &given, shown(1.65)), Reason::OtherHeight { shown_m: 1.65 });
+        assert_eq!(by_height(Reason::WrongSize, &given, shown(1.3)), Reason::OtherHeight { shown_m: 1.3 });
+        assert_eq!(by_height(Reason::NotWalking, &given, shown(1.55)), Reason::NotWalking);
+        assert_eq!(by_height(Reason::NotWalking, &given, None), Reason::NotWalking);
+        let slow = Reason::TooSlow { speed_mps: 0.1 };
+        assert_eq!(by_height(slow, &given, shown(1.65)), slow);
+    }
+
     #[test]
     fn frames_of_a_refused_start_are_kept_for_an_oblique_one() {
         let options = TrackerOptions::default();

@@ -122,7 +122,7 @@ impl BodyHeight {
     }
 
     /// How far another measurement is from it, standard deviations of the difference.
-    fn distance_sd(&self, other: &Self) -> f64 {
+    pub(super) fn distance_sd(&self, other: &Self) -> f64 {
         (self.height_m - other.height_m).abs() / self.sd_m.hypot(other.sd_m)
     }
 

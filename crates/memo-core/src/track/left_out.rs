@@ -52,6 +52,11 @@ pub enum Reason {
     },
     /// The region cannot enclose one person of this height who stands on the ground before this camera.
     WrongSize,
+    /// It fits no walk of a person of the given height, and its rectangles show another height.
+    OtherHeight {
+        /// That height, metres.
+        shown_m: f64,
+    },
     /// The region was wider than one person: several people who moved as one region, or a thing.
     TooWide,
     /// It moved more slowly than people walk, or stayed where it is.
@@ -95,6 +100,7 @@ impl Reason {
             Self::CutOff => "cut off",
             Self::TooSmall { .. } => "too small",
             Self::WrongSize => "wrong size",
+            Self::OtherHeight { .. } => "other height",
             Self::TooWide => "too wide",
             Self::TooSlow { .. } => "too slow",
             Self::TooFast { .. } => "too fast",
@@ -107,7 +113,7 @@ impl Reason {
         }
     }
 
-    /// Its figure: pixels, m/s, seconds or frames; `None` for a reason without one.
+    /// Its figure: pixels, metres, m/s, seconds or frames; `None` for a reason without one.
     #[must_use]
     pub fn value(&self) -> Option<f64> {
         match *self {
@@ -115,6 +121,7 @@ impl Reason {
             Self::TooSlow { speed_mps } | Self::TooFast { speed_mps } | Self::OverGround { speed_mps } => {
                 Some(speed_mps)
             }
+            Self::OtherHeight { shown_m } => Some(shown_m),
             Self::FramesApart { apart_s } => Some(apart_s),
             Self::TooBrief { frames } => Some(frames as f64),
             _ => None,
@@ -123,7 +130,7 @@ impl Reason {
 }
 
 impl Reason {
-    /// The same reason once more, with the mean speed of all times.
+    /// The same reason once more, with the mean figure of all times.
     fn with_another(&self, other: &Self, times: usize) -> Self {
         let mean = |a: f64, b: f64| (times as f64 * a + b) / (times + 1) as f64;
         match (*self, *other) {
@@ -135,6 +142,9 @@ impl Reason {
             }
             (Self::OverGround { speed_mps: a }, Self::OverGround { speed_mps: b }) => {
                 Self::OverGround { speed_mps: mean(a, b) }
+            }
+            (Self::OtherHeight { shown_m: a }, Self::OtherHeight { shown_m: b }) => {
+                Self::OtherHeight { shown_m: mean(a, b) }
             }
             _ => *other,
         }

@@ -161,11 +161,19 @@ pub(super) fn start_height(
         (Some(height_m), _) => BodyHeight::given(height_m),
         (None, None) => population,
         (None, Some(camera)) => {
-            let average = options.walker(POPULATION_HEIGHT_M);
-            let seen = average.ok().and_then(|walker| from_rectangles(camera, sightings, &walker));
-            seen.map_or(population, |seen| combined(&population, &seen))
+            shown_height(options, camera, sightings).map_or(population, |shown| combined(&population, &shown))
         }
     }
+}
+
+/// The height that the rectangles show, whatever height was given; `None` if it is not that of an adult.
+pub(super) fn shown_height(
+    options: &TrackerOptions,
+    camera: &Camera,
+    sightings: &[Sighting],
+) -> Option<BodyHeight> {
+    let average = options.walker(POPULATION_HEIGHT_M).ok()?;
+    from_rectangles(camera, sightings, &average)
 }
 
 /// The same of somebody who comes nearer or goes away: each rectangle has its own rows.

@@ -5,6 +5,7 @@
 //! and what motion put the contours where the frames show them:
 //!
 //! 1. Unknowns start at their means over people (`unknowns`), place and phase of each frame at the tracker's.
+//!    Where the tracker's phase left out a step, a line of phase takes its place (`steps`).
 //! 2. Visible contours are sampled (`lines`), and the nearest edge on each sample's normal is searched
 //!    (`edge_search`).
 //! 3. A Gauss-Newton step moves all unknowns at once; large distances count less (Geman and McClure). Distances that
@@ -34,6 +35,7 @@ mod quality;
 mod route;
 mod seen;
 mod sides;
+mod steps;
 mod unknowns;
 pub(crate) mod views;
 

@@ -19,7 +19,7 @@ use crate::calibrate::TiltEstimate;
 use crate::estimate::kalman::FilterOptions;
 use crate::estimate::line::line_through;
 use crate::image::Image;
-use crate::model::{Camera, Walker};
+use crate::model::{Body, Camera, Walker};
 use glam::{DVec2, DVec3};
 
 /// Number of frames beside those of the feet whose places and phases these go on with.
@@ -46,6 +46,14 @@ const DISTANCES_OF_POORLY: [f64; 4] = [0.85, 0.92, 1.08, 1.16];
 const LIKELIER: f64 = 0.9;
 const LIKELIER_THAN_POORLY: f64 = 0.955;
 
+/// Factors of the tracker's distance at which somebody of another height than the given one starts: taller than the truth by a
+/// tenth, the tracker has that person up to a third too far away.
+const FARTHER: [f64; 7] = [0.65, 0.75, 0.84, 0.92, 1.0, 1.09, 1.2];
+/// As many of these starts are followed to the end.
+const LIKELIEST: usize = 2;
+/// A given height from which that of the rectangles differs by less than this share is not doubted because of a fit in part.
+const AS_TALL: f64 = 0.03;
+
 /// A walk as it was tracked.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Tracked<'a> {
@@ -56,6 +64,8 @@ pub(crate) struct Tracked<'a> {
     /// The average walker of the person's height.
     pub average: &'a Walker,
     pub height: &'a BodyHeight,
+    /// The body height that the first rectangles show, if another one was given, metres.
+    pub shown_height_m: Option<f64>,
     pub is_on_treadmill: bool,
     /// Standard deviation of the distance from the camera, metres.
     pub depth_sd_m: f64,
@@ -83,6 +93,9 @@ impl Tracked<'_> {
             fit
         };
         if !self.is_on_treadmill {
+            // What the tracker said of the sides, it said of other phases.
+            let is_counted = !self.count_steps_again(&route, &mut frames, options);
+            let p_swapped = p_swapped.map(|p| if is_counted { p } else { 0.5 });
             let problem = self.problem(&route, &frames, options);
             let glance = problem.glance(0.0)?;
             let bent = self.fit_over_ground(problem, glance.gait, p_swapped);
@@ -102,7 +115,11 @@ impl Tracked<'_> {
                 true => self.at_another_distance(fit, glance, &mut frames, &tracked_m, options),
                 false => fit,
             };
-            return Ok(with_tilt(self.with_feet(fit?)));
+            let fit = match p_swapped {
+                Some(_) => self.with_height_of_its_own(fit?, glance.gait, &mut frames, &tracked_m, options),
+                None => fit?,
+            };
+            return Ok(with_tilt(self.with_feet(fit)));
         }
         let problem = |route| self.problem(route, &frames, options);
         let route = &route;
@@ -111,7 +128,7 @@ impl Tracked<'_> {
         fit_on_the_spot(&here, &there, p_swapped).map(with_tilt)
     }
 
-    fn problem<'a>(
+    pub(super) fn problem<'a>(
         &'a self,
         route: &'a Route,
         frames: &'a [FitFrame],
@@ -131,8 +148,7 @@ impl Tracked<'_> {
         gait: StartGait,
         p_swapped: Option<f64>,
     ) -> Result<WalkFit, FitError> {
-        let fit = problem.fit(gait, p_swapped)?;
-        Ok(if p_swapped.is_some() { self.with_height_of_its_own(fit, problem, gait) } else { fit })
+        problem.fit(gait, p_swapped)
     }
 
     /// The fit at another distance from the camera, if it is clearly likelier, for somebody whom a fit at the tracker's distance
@@ -157,14 +173,11 @@ impl Tracked<'_> {
             FitVerdict::InPart => (&DISTANCES[..], LIKELIER),
             FitVerdict::Poorly => (&DISTANCES_OF_POORLY[..], LIKELIER_THAN_POORLY),
         };
-        let eye = self.camera.position().truncate();
         let moved = |frames: &mut [FitFrame], factor: f64| {
             for (frame, along_m) in frames.iter_mut().zip(tracked_m) {
                 frame.start.along_m = factor * along_m;
             }
-            let (route, ends_m) =
-                (self.walk.route.scaled(eye, factor), self.ends_m().map(|end| factor * end));
-            fitted_route(self.camera, self.average, &route, ends_m, frames, options)
+            self.scaled_route(factor, self.average, frames, options)
         };
         // 1. Where a few of the frames are likeliest.
         let glance_at = |&factor: &f64| {
@@ -184,20 +197,75 @@ impl Tracked<'_> {
             (Err(_), Ok(there)) => there.quality.verdict() != FitVerdict::Poorly,
             (_, Err(_)) => false,
         };
-        if is_likelier { there.map(|fit| self.with_height_of_its_own(fit, problem, gait)) } else { here }
+        if is_likelier { there } else { here }
     }
 
     /// The same with the height that the picture shows if the given one is far from it: the fit near the given height
     /// tells that it is wrong, but not by how much. One whose soles are not on the ground tells nothing else.
-    fn with_height_of_its_own(&self, fit: WalkFit, problem: Problem<'_>, gait: StartGait) -> WalkFit {
-        let is_given = self.height.source == HeightSource::Given && self.tilt.is_none();
-        let is_off = fit.quality.verdict() != FitVerdict::Well
-            || fit.height.is_none_or(|seen| self.height.contradicts(&seen));
-        let height = || problem.of_any_height().fit(gait, None).ok()?.height;
-        match (is_given && is_off).then(height).flatten() {
+    ///
+    /// The tracker believed the given height, so somebody taller or smaller starts at other distances too.
+    fn with_height_of_its_own(
+        &self,
+        fit: WalkFit,
+        gait: StartGait,
+        frames: &mut [FitFrame],
+        tracked_m: &[f64],
+        options: &FitOptions,
+    ) -> WalkFit {
+        let shown = self.shown_height_m.map(|shown_m| shown_m / self.height.height_m);
+        let is_shown_right = shown.is_some_and(|taller| (taller - 1.0).abs() < AS_TALL);
+        let is_off = fit.height.is_none_or(|seen| self.height.contradicts(&seen))
+            || fit.quality.verdict() != FitVerdict::Well && !is_shown_right;
+        if self.height.source != HeightSource::Given || self.tilt.is_some() || !is_off {
+            return fit;
+        }
+        // 1. A few of the frames from the height of the rectangles at several distances, and from the given one.
+        let tracked: Vec<Hypothesis> = frames.iter().map(|frame| frame.start).collect();
+        let moved = |frames: &mut [FitFrame], [taller, farther]: [f64; 2]| {
+            let body = Body::from_height(taller * self.average.body.height_m).ok()?;
+            for ((frame, along_m), start) in frames.iter_mut().zip(tracked_m).zip(&tracked) {
+                frame.start = Hypothesis {
+                    along_m: farther * along_m,
+                    height_m: taller * start.height_m,
+                    phase: start.phase,
+                };
+            }
+            let average = Walker { body, ..self.average.clone() };
+            let route = self.scaled_route(farther, &average, frames, options);
+            Some((average, route))
+        };
+        let starts = FARTHER.map(|farther| [shown.unwrap_or(1.0), farther]).into_iter().chain([[1.0; 2]]);
+        let mut costs = Vec::new();
+        for start in starts {
+            let Some((average, route)) = moved(frames, start) else { continue };
+            let problem = Problem::new(self.camera, &average, &route, frames, options).of_any_height();
+            costs.extend(problem.few_cost(gait).map(|cost| (cost, start)));
+        }
+        costs.sort_by(|(a, _), (b, _)| a.total_cmp(b));
+        // 2. All frames from the likeliest ones.
+        let mut fits = Vec::new();
+        for (_, start) in costs.into_iter().take(LIKELIEST) {
+            let Some((average, route)) = moved(frames, start) else { continue };
+            let problem = Problem::new(self.camera, &average, &route, frames, options).of_any_height();
+            fits.extend(problem.fit(gait, None));
+        }
+        let best = fits.into_iter().min_by(|a, b| a.quality.total_cost.total_cmp(&b.quality.total_cost));
+        match best.and_then(|best| best.height) {
             Some(seen) => WalkFit { height: Some(seen), ..fit },
             None => fit,
         }
+    }
+
+    /// The tracker's route that much farther away, as it is fitted, through the starts of the frames.
+    fn scaled_route(
+        &self,
+        farther: f64,
+        average: &Walker,
+        frames: &mut [FitFrame],
+        options: &FitOptions,
+    ) -> Route {
+        let route = self.walk.route.scaled(self.camera.position().truncate(), farther);
+        fitted_route(self.camera, average, &route, self.ends_m().map(|end| farther * end), frames, options)
     }
 
     /// The frames to be fitted, in their views, from where the smoothed track has the person.
@@ -425,6 +493,7 @@ impl TrackedWalk {
             tilt: self.tilt.as_ref(),
             average: &self.average,
             height: &height,
+            shown_height_m: self.shown_height_m,
             is_on_treadmill: self.is_on_treadmill,
             depth_sd_m: self.depth_sd_m,
             filter: &self.options.filter,
@@ -443,7 +512,16 @@ mod tests {
 
     /// The fit of a drawn walk whose tracker had all distances from the camera wrong by a factor.
     fn fit_from(factor: f64) -> WalkFit {
+        fit_of(factor, 1.0, |phase| phase)
+    }
+
+    /// The same of somebody whose given height was wrong by another factor, and whose rectangles show the true one; and the tracker
+    /// took phases for others.
+    fn fit_of(factor: f64, taller: f64, tracked: impl Fn(f64) -> f64) -> WalkFit {
         let Drawn { camera, walker, route, frames } = drawn_for(TWO_STEPS);
+        let shown_m = walker.body.height_m;
+        let body = Body::from_height(taller * shown_m).unwrap();
+        let walker = Walker { body, ..walker };
         let elapsed_s = frames[1].time_s - frames[0].time_s;
         let speed = |from: f64, to: f64| (to - from) / elapsed_s;
         let [first, second] = [0, 1].map(|k| frames[k].start);
@@ -459,6 +537,7 @@ mod tests {
         let half_torso_m = 0.5 * walker.body.torso_length_m();
         let step = |(k, frame): (usize, &FitFrame)| {
             let Hypothesis { along_m, height_m, phase } = frame.start;
+            let phase = tracked(phase);
             let level_m = height_m + half_torso_m - walker.gait.vertical_m(phase);
             let state = State {
                 along: ConstantVelocity::new(factor * along_m, beginning.speed_mps, 1e-4, 0.01),
@@ -474,6 +553,7 @@ mod tests {
             tilt: None,
             average: &walker,
             height: &BodyHeight::given(walker.body.height_m),
+            shown_height_m: Some(shown_m),
             is_on_treadmill: false,
             depth_sd_m: 0.0,
             filter: &FilterOptions::default(),
@@ -500,6 +580,32 @@ mod tests {
         let kept = |first: usize, last: usize| turned.clone().outside([first, last], 1).unwrap();
         let frame = |k: usize| turned.walk.steps()[k].frame;
         assert!(kept(0, frame(9)).is_frontal && !kept(frame(20), frame(29)).is_frontal);
+    }
+
+    #[test]
+    fn a_given_height_that_is_wrong_is_measured_whatever_distance_it_led_to() {
+        let right_m = drawn_for(TWO_STEPS).walker.body.height_m;
+        for (taller, factor) in [(0.9, 0.9), (1.1, 1.0), (1.1, 1.3)] {
+            let height = fit_of(factor, taller, |phase| phase).height.unwrap();
+            assert!((height.height_m - right_m).abs() < 0.03, "{taller} {factor}: {height:?}");
+            assert!(
+                BodyHeight::given(taller * right_m).contradicts(&height),
+                "{taller} {factor}: {height:?}"
+            );
+        }
+    }
+
+    /// From a phase that stands for a step, a fit has the legs the wrong way round from then on.
+    #[test]
+    fn a_step_that_the_tracker_left_out_is_counted() {
+        let Drawn { frames, .. } = drawn_for(TWO_STEPS);
+        let stands_at = frames[frames.len() / 3].start.phase;
+        let tracked = |phase: f64| if phase < stands_at { phase } else { stands_at.max(phase - 0.5) };
+        let fit = fit_of(1.0, 1.0, tracked);
+        for (fitted, frame) in fit.frames.iter().zip(&frames) {
+            let off = 2.0 * (fitted.phase - frame.start.phase);
+            assert!((off - off.round()).abs() < 0.1, "{} instead of {}", fitted.phase, frame.start.phase);
+        }
     }
 
     /// A sixth too far or too near, the fit alone seeks the feet in the shanks or below the shoes.

@@ -354,6 +354,14 @@ impl<'a> Problem<'a> {
         best.map(|(_, best)| best).ok_or(FitError::Undetermined)
     }
 
+    /// The total cost of a few of the frames with the person's curves, from one gait.
+    pub fn few_cost(&self, gait: StartGait) -> Option<f64> {
+        let few = self.of_few_frames();
+        let (_, start) = few.started(0.0, gait)?;
+        let [_, total_cost] = few.curves_costs(start)?;
+        Some(total_cost)
+    }
+
     /// The same with every second, third ... frame, so that there are at most [`FEW_FRAMES`], but at least one in [`FEW_S`].
     fn of_few_frames(&self) -> Self {
         let count = self.frames.len();

@@ -300,9 +300,15 @@ impl Thing {
         let is_wide = usual(&self.shots.all(), |r| r.width()) > WIDE * height_px;
         let refused = self.refused.iter().max_by_key(|(times, _)| *times).map(|(_, reason)| *reason);
         match refused {
-            Some(Reason::NotWalking | Reason::TooSlow { .. }) if height_px < SMALLEST_PX => return small,
-            Some(Reason::NotWalking) if is_wide => return Reason::TooWide,
-            Some(Reason::NotWalking) if 2 * self.beside > self.shots.seen => return Reason::Beside,
+            Some(Reason::NotWalking | Reason::OtherHeight { .. } | Reason::TooSlow { .. })
+                if height_px < SMALLEST_PX =>
+            {
+                return small;
+            }
+            Some(Reason::NotWalking | Reason::OtherHeight { .. }) if is_wide => return Reason::TooWide,
+            Some(Reason::NotWalking | Reason::OtherHeight { .. }) if 2 * self.beside > self.shots.seen => {
+                return Reason::Beside;
+            }
             Some(reason) => return reason,
             None => {}
         }

@@ -65,6 +65,7 @@ pub fn tracked(walk: Walk, start: StartReport, options: WalkOptions) -> TrackedW
         unexplained: None,
         height: BodyHeight::given(1.75),
         depth_sd_m: 0.0,
+        shown_height_m: None,
         start,
         fit: None,
         options,

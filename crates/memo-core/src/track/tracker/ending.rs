@@ -203,6 +203,7 @@ impl Tracker {
             camera: active.camera,
             average: active.average,
             depth_sd_m: active.depth_sd_m,
+            shown_height_m: active.shown_height_m,
             start: active.start,
             tilt: active.tilt,
             is_on_treadmill: active.is_on_treadmill,
