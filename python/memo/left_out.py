@@ -46,8 +46,8 @@ class LeftOut:
     """"cut off", "too small", "wrong size", "other height", "too wide", "too slow", "too fast",
     "not walking", "too brief", "beside somebody", "too many", "frames too far apart" or "over ground"."""
     value: float | None
-    """The figure of the reason: height in pixels or metres, speed in m/s (across the picture, or over the ground for
-    "over ground"), seconds, or a number of frames."""
+    """The figure of the reason: height in pixels or metres, speed in m/s (across the picture, or over the
+    ground for "over ground"), seconds, or a number of frames."""
 
     @property
     def sentence(self) -> str:
@@ -169,8 +169,8 @@ _SENTENCES: dict[str, Callable[[LeftOut], str]] = {
     "too small": lambda left: f"only {left.value or 0:.0f} px high, too small to see limbs.",
     "wrong size": lambda left: "too small or too large for a person who stands on the ground there.",
     "other height": lambda left: (
-        f"it is {left.value or 0:.2f} m tall where it stands on the ground, and no walk of somebody of the given "
-        "height fits it: check height and camera."
+        f"it is {left.value or 0:.2f} m tall where it stands on the ground, and no walk of somebody of the "
+        "given height fits it: check height and camera."
     ),
     "too wide": lambda left: "wider than one person: several people who move as one region, or a thing.",
     "too slow": lambda left: (
