@@ -44,7 +44,7 @@ pub(super) struct Active {
     pub(super) tilt: Option<TiltEstimate>,
     /// The body height with which the walk started.
     pub(super) height: BodyHeight,
-    /// The body height that the first rectangles show in a calibrated camera, if another one was given, metres.
+    /// The body height that the first rectangles show in a calibrated camera, if a height was given, metres.
     pub(super) shown_height_m: Option<f64>,
     pub(super) depth_sd_m: f64,
     pub(super) start: StartReport,

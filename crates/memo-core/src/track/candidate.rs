@@ -613,7 +613,6 @@ pub(super) mod tests {
         assert!(!refused.is_newcomer(&body));
     }
 
-    /// After a refused start, the next one has the latest frames and, once they show a path, the older ones too.
     #[test]
     fn a_start_fails_by_its_height_if_the_rectangles_show_another_one() {
         let shown = |height_m| Some(BodyHeight { sd_m: 0.05, ..BodyHeight::given(height_m) });
@@ -626,6 +625,7 @@ pub(super) mod tests {
         assert_eq!(by_height(slow, &given, shown(1.65)), slow);
     }
 
+    /// After a refused start, the next one has the latest frames and, once they show a path, the older ones too.
     #[test]
     fn frames_of_a_refused_start_are_kept_for_an_oblique_one() {
         let options = TrackerOptions::default();

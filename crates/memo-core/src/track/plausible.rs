@@ -17,7 +17,8 @@ use super::walk::Walk;
 /// 1.5 m/s, among them crouched, limping and brisk ones, and a filmed one have 0.0048 to 0.0074.
 const USUAL: [f64; 2] = [0.0040, 0.0095];
 
-/// Logarithm of the walk ratio of that person: mean and standard deviation over walks. Those 28 walks are within 1.5 of it.
+/// The most usual walk ratio of that person, and the standard deviation of its logarithm over walks. Chosen: those 28 walks are within
+/// 1.5 standard deviations.
 const MEAN: f64 = 0.0060;
 const LOG_SD: f64 = 0.15;
 /// Farther than this many standard deviations, ratios are alike: people also walk slowly, and frame rates are wrong.

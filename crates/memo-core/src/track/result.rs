@@ -37,7 +37,7 @@ pub struct TrackedWalk {
     pub tilt: Option<TiltEstimate>,
     /// The body height that the walk was tracked with: given, measured or assumed.
     pub height: BodyHeight,
-    /// The body height that the first rectangles show in a calibrated camera, if another one was given, metres.
+    /// The body height that the first rectangles show in a calibrated camera, if a height was given, metres.
     pub shown_height_m: Option<f64>,
     /// The average walker of the person's height, from which a fit starts.
     pub average: Walker,

@@ -64,7 +64,7 @@ pub(crate) struct Tracked<'a> {
     /// The average walker of the person's height.
     pub average: &'a Walker,
     pub height: &'a BodyHeight,
-    /// The body height that the first rectangles show, if another one was given, metres.
+    /// The body height that the first rectangles show, if a height was given, metres.
     pub shown_height_m: Option<f64>,
     pub is_on_treadmill: bool,
     /// Standard deviation of the distance from the camera, metres.
@@ -98,7 +98,7 @@ impl Tracked<'_> {
             let p_swapped = p_swapped.map(|p| if is_counted { p } else { 0.5 });
             let problem = self.problem(&route, &frames, options);
             let glance = problem.glance(0.0)?;
-            let bent = self.fit_over_ground(problem, glance.gait, p_swapped);
+            let bent = problem.fit(glance.gait, p_swapped);
             // A walk goes on along its route and in its distance, so only those of a whole walk are given up; and on the ground of
             // an assumed camera a straight line may be bent, and the distance is the height's.
             let is_compared = p_swapped.is_some() && self.tilt.is_none();
@@ -108,7 +108,7 @@ impl Tracked<'_> {
                 Some(line) => {
                     let problem = self.problem(&line, &frames, options);
                     let gait = problem.glance(0.0).map(|glance| glance.gait);
-                    nearer(gait.and_then(|gait| self.fit_over_ground(problem, gait, p_swapped)), bent)
+                    nearer(gait.and_then(|gait| problem.fit(gait, p_swapped)), bent)
                 }
             };
             let fit = match is_compared {
@@ -140,15 +140,6 @@ impl Tracked<'_> {
             HeightSource::Given => problem,
             _ => problem.of_height(self.height),
         }
-    }
-
-    fn fit_over_ground(
-        &self,
-        problem: Problem<'_>,
-        gait: StartGait,
-        p_swapped: Option<f64>,
-    ) -> Result<WalkFit, FitError> {
-        problem.fit(gait, p_swapped)
     }
 
     /// The fit at another distance from the camera, if it is clearly likelier, for somebody whom a fit at the tracker's distance

@@ -19,7 +19,7 @@ use crate::track::route::Route;
 const UNEVEN: f64 = 0.08;
 const UNEVEN_OF_UNUSUAL: f64 = 0.025;
 /// A line is taken if a few of the frames and its walk ratio cost less than this factor of what they cost with the tracker's phases.
-/// Where steps were left out, that is 0.70 to 0.85.
+/// Where steps were left out, that is 0.70 to 0.85; of one walk whose steps are counted 0.85 too, so phases are doubted first.
 const LIKELIER: f64 = 0.9;
 /// Neighbouring lines are apart by so many cycles, at the middle of the walk and from its first frame to its last. The half of a cycle
 /// remains open: it is what exchanges the sides.

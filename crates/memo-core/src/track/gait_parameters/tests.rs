@@ -147,7 +147,6 @@ fn tracked(measured: &[Measured], path: Path, direction: Direction) -> TrackedWa
     walk.twins[0].similarity_sum = 0.5 * measured.len() as f64;
     TrackedWalk {
         depth_sd_m: 0.1,
-        shown_height_m: None,
         ..result::tests::tracked(walk, report(path, beginning, direction), options)
     }
 }

@@ -299,16 +299,12 @@ impl Thing {
         let small = Reason::TooSmall { height_px };
         let is_wide = usual(&self.shots.all(), |r| r.width()) > WIDE * height_px;
         let refused = self.refused.iter().max_by_key(|(times, _)| *times).map(|(_, reason)| *reason);
+        let fits_no_walk = matches!(refused, Some(Reason::NotWalking | Reason::OtherHeight { .. }));
         match refused {
-            Some(Reason::NotWalking | Reason::OtherHeight { .. } | Reason::TooSlow { .. })
-                if height_px < SMALLEST_PX =>
-            {
-                return small;
-            }
-            Some(Reason::NotWalking | Reason::OtherHeight { .. }) if is_wide => return Reason::TooWide,
-            Some(Reason::NotWalking | Reason::OtherHeight { .. }) if 2 * self.beside > self.shots.seen => {
-                return Reason::Beside;
-            }
+            Some(Reason::TooSlow { .. }) if height_px < SMALLEST_PX => return small,
+            Some(_) if fits_no_walk && height_px < SMALLEST_PX => return small,
+            Some(_) if fits_no_walk && is_wide => return Reason::TooWide,
+            Some(_) if fits_no_walk && 2 * self.beside > self.shots.seen => return Reason::Beside,
             Some(reason) => return reason,
             None => {}
         }
