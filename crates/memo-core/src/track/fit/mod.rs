@@ -17,7 +17,8 @@
 //!    first ones too, and the evidence decides (`sides`).
 //! 7. Standard deviations follow from the normal equations.
 //! 8. A fit that is not a good one is made again at other distances from the camera, where the likeliest is clearly likelier
-//!    (`of_walk`).
+//!    (`other_starts`).
+//! 9. Frames in which the feet alone show the walk go on from the fitted ones (`seam`).
 //!
 //! The normal equations (`normal`) have the form of an arrow ([`estimate::arrow`](crate::estimate::arrow)), so the time
 //! is linear in the number of frames.
@@ -30,9 +31,11 @@ mod headings;
 mod lines;
 mod normal;
 pub(crate) mod of_walk;
+mod other_starts;
 mod problem;
 mod quality;
 mod route;
+mod seam;
 mod seen;
 mod sides;
 mod steps;

@@ -1,58 +1,25 @@
 //! The fit of a tracked walk: where the problem starts, and a fit to pictures that are given afterwards.
 
-use super::super::decisions::{ACROSS_SD_M, COMMON_PHASE_SD};
 use super::super::height::{BodyHeight, HeightSource};
 use super::super::result::{TrackedWalk, smoothed_hypotheses};
 use super::super::route::Route;
 use super::super::search::{Hypothesis, mirrored};
 use super::super::steady;
 use super::super::walk::{Step, Walk};
-use super::contacts::Contact;
 use super::edge_search::View;
-use super::problem::{Glance, StartGait};
 use super::views::{Backdrop, Piece};
-use super::{
-    FitError, FitFrame, FitOptions, FitVerdict, FittedFrame, Problem, WalkFit, fit_on_the_spot, fitted_route,
-    straightened,
-};
+use super::{FitError, FitFrame, FitOptions, Problem, WalkFit, fit_on_the_spot, fitted_route, straightened};
 use crate::calibrate::TiltEstimate;
 use crate::estimate::kalman::FilterOptions;
-use crate::estimate::line::line_through;
 use crate::image::Image;
-use crate::model::{Body, Camera, Walker};
+use crate::model::{Camera, Walker};
 use glam::{DVec2, DVec3};
-
-/// Number of frames beside those of the feet whose places and phases these go on with.
-const SEAM: usize = 8;
-/// Beside the frames of the feet, places are those to which the fit leads, and until this time from there ever more those
-/// of the feet, seconds. Chosen: with the difference added to all frames of the feet, two drawn people were 19 and 11
-/// instead of 7 and 9 cm off along the path, and one 4 instead of 8.
-const SEAM_S: f64 = 1.0;
 
 /// A slightly bent route is given up for a straight line unless the line costs more than this factor. Of 29 drawn people who
 /// went straight, with and without a height, the tracker bends four routes: one by 15 degrees, which costs 0.98 on the line, and
 /// three by 5 to 7, which cost 1.02 to 1.08 and stay. Of 17 who turned by 20 to 40 degrees, 16 cost 1.04 to 1.28; one, of 20
 /// degrees, costs 0.93, with lengths of the body nearer to the average.
 const STRAIGHT: f64 = 1.02;
-
-/// Other distances from the camera at which a fit is tried, as factors of the tracker's: of somebody whom the first one fits in
-/// part, and also those of somebody whom it fits poorly or not at all.
-const DISTANCES: [f64; 2] = [0.85, 1.16];
-const DISTANCES_OF_POORLY: [f64; 4] = [0.85, 0.92, 1.08, 1.16];
-/// A fit at another distance is taken if it costs less than this factor of the one at the tracker's, which fits in part or
-/// poorly. Of people whom the tracker has 0.5 m and more too far away, it costs 0.62 to 0.80 of it, and 0.94 of one who fits poorly.
-/// Of those who are at most 13 cm off, it costs 0.89 to 0.99; most of them come out nearer to the truth, but a filmed woman, with
-/// 0.95, has the ankles 13 instead of 6 pixels off.
-const LIKELIER: f64 = 0.9;
-const LIKELIER_THAN_POORLY: f64 = 0.955;
-
-/// Factors of the tracker's distance at which somebody of another height than the given one starts: taller than the truth by a
-/// tenth, the tracker has that person up to a third too far away.
-const FARTHER: [f64; 7] = [0.65, 0.75, 0.84, 0.92, 1.0, 1.09, 1.2];
-/// As many of these starts are followed to the end.
-const LIKELIEST: usize = 2;
-/// A given height from which that of the rectangles differs by less than this share is not doubted because of a fit in part.
-const AS_TALL: f64 = 0.03;
 
 /// A walk as it was tracked.
 #[derive(Debug, Clone, Copy)]
@@ -142,123 +109,6 @@ impl Tracked<'_> {
         }
     }
 
-    /// The fit at another distance from the camera, if it is clearly likelier, for somebody whom a fit at the tracker's distance
-    /// does not fit well. The tracker keeps the distance of the first frames, where others may have hidden the feet. A fit finds
-    /// the distance from starts up to about a tenth off; from farther ones it seeks the feet in the shanks or below the shoes.
-    /// `glance` is that at the tracker's distance, and `tracked_m` are the tracker's places of the frames along its route.
-    fn at_another_distance(
-        &self,
-        here: Result<WalkFit, FitError>,
-        glance: Glance,
-        frames: &mut [FitFrame],
-        tracked_m: &[f64],
-        options: &FitOptions,
-    ) -> Result<WalkFit, FitError> {
-        let verdict = match &here {
-            Ok(fit) => fit.quality.verdict(),
-            Err(FitError::Misfit { .. }) => FitVerdict::Poorly,
-            Err(_) => return here,
-        };
-        let (distances, most_cost) = match verdict {
-            FitVerdict::Well => return here,
-            FitVerdict::InPart => (&DISTANCES[..], LIKELIER),
-            FitVerdict::Poorly => (&DISTANCES_OF_POORLY[..], LIKELIER_THAN_POORLY),
-        };
-        let moved = |frames: &mut [FitFrame], factor: f64| {
-            for (frame, along_m) in frames.iter_mut().zip(tracked_m) {
-                frame.start.along_m = factor * along_m;
-            }
-            self.scaled_route(factor, self.average, frames, options)
-        };
-        // 1. Where a few of the frames are likeliest.
-        let glance_at = |&factor: &f64| {
-            let route = moved(frames, factor);
-            Some((factor, self.problem(&route, frames, options).glance(0.0).ok()?))
-        };
-        let glances: Vec<_> = distances.iter().filter_map(glance_at).collect();
-        let likeliest = glances.into_iter().min_by(|(_, a), (_, b)| a.total_cost.total_cmp(&b.total_cost));
-        let is_likelier = |there: &(f64, Glance)| there.1.total_cost < glance.total_cost;
-        let Some((factor, Glance { gait, .. })) = likeliest.filter(is_likelier) else { return here };
-        // 2. All frames there. What the tracker said of the sides, contours said that lay elsewhere.
-        let route = moved(frames, factor);
-        let problem = self.problem(&route, frames, options);
-        let there = problem.fit(gait, Some(0.5));
-        let is_likelier = match (&here, &there) {
-            (Ok(here), Ok(there)) => there.quality.total_cost < most_cost * here.quality.total_cost,
-            (Err(_), Ok(there)) => there.quality.verdict() != FitVerdict::Poorly,
-            (_, Err(_)) => false,
-        };
-        if is_likelier { there } else { here }
-    }
-
-    /// The same with the height that the picture shows if the given one is far from it: the fit near the given height
-    /// tells that it is wrong, but not by how much. One whose soles are not on the ground tells nothing else.
-    ///
-    /// The tracker believed the given height, so somebody taller or smaller starts at other distances too.
-    fn with_height_of_its_own(
-        &self,
-        fit: WalkFit,
-        gait: StartGait,
-        frames: &mut [FitFrame],
-        tracked_m: &[f64],
-        options: &FitOptions,
-    ) -> WalkFit {
-        let shown = self.shown_height_m.map(|shown_m| shown_m / self.height.height_m);
-        let is_shown_right = shown.is_some_and(|taller| (taller - 1.0).abs() < AS_TALL);
-        let is_off = fit.height.is_none_or(|seen| self.height.contradicts(&seen))
-            || fit.quality.verdict() != FitVerdict::Well && !is_shown_right;
-        if self.height.source != HeightSource::Given || self.tilt.is_some() || !is_off {
-            return fit;
-        }
-        // 1. A few of the frames from the height of the rectangles at several distances, and from the given one.
-        let tracked: Vec<Hypothesis> = frames.iter().map(|frame| frame.start).collect();
-        let moved = |frames: &mut [FitFrame], [taller, farther]: [f64; 2]| {
-            let body = Body::from_height(taller * self.average.body.height_m).ok()?;
-            for ((frame, along_m), start) in frames.iter_mut().zip(tracked_m).zip(&tracked) {
-                frame.start = Hypothesis {
-                    along_m: farther * along_m,
-                    height_m: taller * start.height_m,
-                    phase: start.phase,
-                };
-            }
-            let average = Walker { body, ..self.average.clone() };
-            let route = self.scaled_route(farther, &average, frames, options);
-            Some((average, route))
-        };
-        let starts = FARTHER.map(|farther| [shown.unwrap_or(1.0), farther]).into_iter().chain([[1.0; 2]]);
-        let mut costs = Vec::new();
-        for start in starts {
-            let Some((average, route)) = moved(frames, start) else { continue };
-            let problem = Problem::new(self.camera, &average, &route, frames, options).of_any_height();
-            costs.extend(problem.few_cost(gait).map(|cost| (cost, start)));
-        }
-        costs.sort_by(|(a, _), (b, _)| a.total_cmp(b));
-        // 2. All frames from the likeliest ones.
-        let mut fits = Vec::new();
-        for (_, start) in costs.into_iter().take(LIKELIEST) {
-            let Some((average, route)) = moved(frames, start) else { continue };
-            let problem = Problem::new(self.camera, &average, &route, frames, options).of_any_height();
-            fits.extend(problem.fit(gait, None));
-        }
-        let best = fits.into_iter().min_by(|a, b| a.quality.total_cost.total_cmp(&b.quality.total_cost));
-        match best.and_then(|best| best.height) {
-            Some(seen) => WalkFit { height: Some(seen), ..fit },
-            None => fit,
-        }
-    }
-
-    /// The tracker's route that much farther away, as it is fitted, through the starts of the frames.
-    fn scaled_route(
-        &self,
-        farther: f64,
-        average: &Walker,
-        frames: &mut [FitFrame],
-        options: &FitOptions,
-    ) -> Route {
-        let route = self.walk.route.scaled(self.camera.position().truncate(), farther);
-        fitted_route(self.camera, average, &route, self.ends_m().map(|end| farther * end), frames, options)
-    }
-
     /// The frames to be fitted, in their views, from where the smoothed track has the person.
     pub fn frames(&self, views: Vec<View>) -> Vec<FitFrame> {
         let walker = &self.walk.walker;
@@ -274,106 +124,15 @@ impl Tracked<'_> {
         shown.zip(views).map(frame).collect()
     }
 
-    fn steps(&self) -> &[Step] {
+    pub(super) fn steps(&self) -> &[Step] {
         self.walk.steps()
     }
 
     /// Where the first and the last frame are along the route.
-    fn ends_m(&self) -> [f64; 2] {
+    pub(super) fn ends_m(&self) -> [f64; 2] {
         let steps = self.steps();
         let ends = [steps.first(), steps.last()];
         ends.map(|step| step.map_or(0.0, |step| step.state.along.position))
-    }
-
-    /// The fit with the frames in which the feet alone show the walk: there the person goes on from the fitted frames, soon
-    /// where the feet say, with the person's own curves, of which nothing is measured. The fit bends the whole route by the
-    /// frames that it sees, so in the others the route is the tracker's.
-    fn with_feet(&self, fit: WalkFit) -> WalkFit {
-        let steps = self.steps();
-        if steps.iter().all(|step| !step.by_feet) {
-            return fit;
-        }
-        let walker = fit.walker();
-        let shown: Vec<usize> = (0..steps.len()).filter(|&k| !steps[k].by_feet).collect();
-        let time_s = |k: usize| steps[k].time_s;
-        // 1. How far the place to which some fitted frames lead is from what the feet say of the frame after them, or
-        // before them, and the mean difference of their phases.
-        let by_feet = |k: usize| self.walk.route.place(steps[k].state.along.position);
-        let apart = |range: std::ops::Range<usize>, next: isize| {
-            let beside = if next > 0 { range.end - 1 } else { range.start };
-            let k = shown[beside].saturating_add_signed(next);
-            let led = [DVec2::X, DVec2::Y].map(|axis| {
-                let place = |n: usize| (time_s(shown[n]), axis.dot(fit.frames[n].torso_centre.truncate()));
-                let (speed, at_0) = line_through(&range.clone().map(place).collect::<Vec<_>>());
-                at_0 + speed * time_s(k)
-            });
-            let count = range.len() as f64;
-            let phase_off = |n: usize| fit.frames[n].phase - steps[shown[n]].state.phase.position;
-            (DVec2::from_array(led) - by_feet(k), range.map(phase_off).sum::<f64>() / count)
-        };
-        let height_m = |n: usize| fit.frames[n].torso_centre.z - walker.gait.vertical_m(fit.frames[n].phase);
-        let level_m = (0..shown.len()).map(height_m).sum::<f64>() / shown.len() as f64;
-        // 2. Place and phase of all frames, and the route through the places.
-        let at = |k: usize| {
-            let after = shown.partition_point(|&other| other < k);
-            if shown.get(after) == Some(&k) {
-                return (fit.frames[after].torso_centre.truncate(), fit.frames[after].phase);
-            }
-            let before = (after > 0).then(|| (after - 1, apart(after.saturating_sub(SEAM)..after, 1)));
-            let behind =
-                (after < shown.len()).then(|| (after, apart(after..(after + SEAM).min(shown.len()), -1)));
-            let from_s = |n: usize| (time_s(k) - time_s(shown[n])).abs();
-            let (off_m, phase_off) = match (before, behind) {
-                (Some((a, before)), Some((b, behind))) => {
-                    let lasts_s = from_s(a) + from_s(b);
-                    let fading = |n: usize| (1.0 - from_s(n) / lasts_s.min(SEAM_S)).max(0.0);
-                    // The phases may be half a cycle apart, if the feet lost count.
-                    let phase_off = before.1 + from_s(a) / lasts_s * (behind.1 - before.1);
-                    (fading(a) * before.0 + fading(b) * behind.0, phase_off)
-                }
-                (a, b) => a.or(b).map_or_else(Default::default, |(n, (off_m, phase_off))| {
-                    ((1.0 - from_s(n) / SEAM_S).max(0.0) * off_m, phase_off)
-                }),
-            };
-            (by_feet(k) + off_m, steps[k].state.phase.position + phase_off)
-        };
-        let places: Vec<(DVec2, f64)> = (0..steps.len()).map(at).collect();
-        let first_m = fit.frames[0].along_m;
-        let points: Vec<DVec2> = places.iter().map(|(place, _)| *place).collect();
-        let route = Route::through(&points, first_m).unwrap_or_else(|| fit.route.clone());
-        let mut near_m = first_m;
-        let frame = |(k, (place, phase)): (usize, (DVec2, f64))| {
-            near_m = route.along(place, near_m);
-            let after = shown.partition_point(|&other| other < k);
-            if shown.get(after) == Some(&k) {
-                return FittedFrame { along_m: near_m, ..fit.frames[after].clone() };
-            }
-            let state = &steps[k].state;
-            let nearest = &fit.frames[after.min(shown.len() - 1)];
-            FittedFrame {
-                torso_centre: place.extend(level_m + walker.gait.vertical_m(phase)),
-                heading_rad: route.at(near_m).heading_rad,
-                along_m: near_m,
-                phase,
-                posture: walker.gait.posture(phase.rem_euclid(1.0), &walker.style),
-                measured: Default::default(),
-                sd: [
-                    state.along.position_sd().hypot(self.depth_sd_m),
-                    nearest.sd[1].hypot(ACROSS_SD_M),
-                    nearest.sd[2],
-                    state.phase.position_sd().hypot(COMMON_PHASE_SD),
-                ],
-            }
-        };
-        let frames = places.into_iter().enumerate().map(frame).collect();
-        // 3. Contacts are those of feet that were seen as a whole.
-        let is_shown = |contact: &Contact| {
-            let after = steps.partition_point(|step| step.time_s < contact.time_s);
-            let near = [after.saturating_sub(1), after.min(steps.len() - 1)];
-            near.iter().all(|&k| !steps[k].by_feet)
-        };
-        let contacts = fit.contacts.iter().copied().filter(is_shown).collect();
-        WalkFit { frames, contacts, route, ..fit }
     }
 }
 
@@ -498,6 +257,7 @@ mod tests {
     use super::super::problem::tests::{Drawn, TWO_STEPS, drawn_for};
     use super::*;
     use crate::estimate::kalman::ConstantVelocity;
+    use crate::model::Body;
     use crate::track::walk::tests::step_in;
     use crate::track::walk::{Beginning, State};
 
