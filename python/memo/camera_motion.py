@@ -44,6 +44,11 @@ class CameraMotion:
     """Pixels of the video per pixel of a frame, along each axis."""
     camera_given: bool = False
     """Whether a calibration was given."""
+    shown_px: tuple[int, int, int, int] = (0, 0, 0, 0)
+    """How far the frames of a camera that pans go on beyond the first one, in pixels as given to the tracker:
+    left, top, right and bottom; 0 of one that does not."""
+    reach_px: tuple[int, int, int, int] = (0, 0, 0, 0)
+    """How far the tracker looked there."""
 
     @property
     def columns(self) -> dict[str, npt.NDArray[Any]]:
@@ -64,6 +69,14 @@ class CameraMotion:
     def moved(self) -> bool:
         """True if frames were steadied or a view ended."""
         return bool(self.lost) or any(row.state == "turned" for row in self.rows)
+
+    @property
+    def wider_px(self) -> tuple[int, int, int, int] | None:
+        """The `reach_px` with which a tracker sees all of a camera that pans; None if this one did."""
+        if all(shown <= reach for shown, reach in zip(self.shown_px, self.reach_px, strict=True)):
+            return None
+        left, top, right, bottom = map(max, self.shown_px, self.reach_px)
+        return left, top, right, bottom
 
     @property
     def is_unexplained(self) -> bool:
@@ -101,6 +114,13 @@ class CameraMotion:
                 f"The camera moved: {where}the picture shifts by up to {summary['largest_px']:.1f} px "
                 f"({summary['rms_px']:.1f} px root mean square) against the first frame. "
                 f"Of {counted(len(self.rows), 'frame')}, {counted(steadied, 'was', 'were')} turned back."
+            )
+        if (wider_px := self.wider_px) is not None:
+            left, top, right, bottom = (side * self.shrink for side in wider_px)
+            said.append(
+                f"The camera pans: it shows {left} px to the left of the first frame, {top} above it, {right} "
+                f"to the right and {bottom} below. Who was there was not followed: give reach_px="
+                f"{wider_px}, or frames that can be read twice."
             )
         if self.is_unexplained:
             said.append(

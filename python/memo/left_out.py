@@ -29,7 +29,7 @@ _LEAST_ON_THE_SPOT = 40
 class LeftOut:
     """Somebody or something that moved and was not followed.
 
-    Frames and pixels are those of the `Track`. If the camera moved, boxes are in the view of the first frame.
+    Frames and pixels are those of the `Track`.
     """
 
     first_frame: int

@@ -215,6 +215,12 @@ def _track_recording(
         tracker, place = memo.Tracker(**options), recording.follow
         boxes = None if recording.boxes is None else _boxes(recording.boxes, reader)
         recorded = follow(reader, tracker, source, out, reader.frame_count, progress, stop, place, boxes)
+        wider_px = recorded.camera_motion.wider_px
+        if wider_px is not None and not recorded.interrupted:
+            remark(f"{video}: the camera pans: tracking once more, in larger pictures")
+            tracker = memo.Tracker(**options, reach_px=wider_px)
+            with opened() as again:
+                recorded = follow(again, tracker, source, out, again.frame_count, progress, stop, place, boxes)
         if recorded.not_there is not None:
             remark(f"{video}: {recorded.not_there}")
         if reader.damage:

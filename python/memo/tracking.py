@@ -73,6 +73,9 @@ class Tracker:
     `full_gradient`, `full_velocity`: edges of smaller gradient (grey levels per pixel) or image speed (pixels
     per frame) are weighted in proportion, w_G and w_V of eq. 11; None weights all equally.
     `part_weights`: w_K, 14 numbers in the order of `Track.contour_parts`.
+    `reach_px`: how far pictures of a camera that pans go on beyond the first frame: left, top, right and
+    bottom, pixels. People there are followed. What a video needs is `CameraMotion.wider_px` of a first
+    `Track`; None is 0.
 
     Defaults: `fov_deg` 62, `gait` "dense", `start_frames` 13, `measure` "rohr".
     """
@@ -94,6 +97,7 @@ class Tracker:
         full_gradient: float | None = None,
         full_velocity: float | None = None,
         part_weights: Sequence[float] | None = None,
+        reach_px: tuple[int, int, int, int] | None = None,
     ) -> None:
         self.options: dict[str, Any] = {
             "height_m": height_m,
@@ -109,6 +113,7 @@ class Tracker:
             "full_gradient": full_gradient,
             "full_velocity": full_velocity,
             "part_weights": part_weights,
+            "reach_px": reach_px,
         }
         """All options but the camera; a run's record has them as they were, whatever the defaults become."""
         usual = _memo.defaults("track")
@@ -150,7 +155,11 @@ class Tracker:
         self._core.finish()
         self._walks += self._core.take_finished()
         motion = CameraMotion(
-            self._core.camera_motion(), self._core.lost_views(), camera_given=self._camera is not None
+            self._core.camera_motion(),
+            self._core.lost_views(),
+            camera_given=self._camera is not None,
+            shown_px=self._core.reach_px(),
+            reach_px=self.options["reach_px"] or (0, 0, 0, 0),
         )
         found = Track(
             self._walks,
@@ -192,6 +201,7 @@ def track(
     full_gradient: float | None = None,
     full_velocity: float | None = None,
     part_weights: Sequence[float] | None = None,
+    reach_px: tuple[int, int, int, int] | None = None,
 ) -> Track:
     """Tracks everybody who walks through frames, (H, W) uint8 each, given `times_s` or `fps`.
 
@@ -201,30 +211,39 @@ def track(
     moves.
     `progress` is called with the number of frames done and the total, None if `frames` has no length;
     the options from `fov_deg` on are those of `Tracker`. Pixels in the result are those of the given frames.
+    Frames of a camera that pans are tracked a second time in larger pictures (`reach_px`), unless they can be
+    read only once.
     An interrupt (Ctrl-C) passes through; use `Tracker` to keep what was tracked until then.
     """
     if (times_s is None) == (fps is None):
         raise ValueError("give either times_s or fps")
     if fps is not None and not (np.isfinite(fps) and fps > 0):
         raise ValueError(f"fps must be a positive number, got {fps}")
-    tracker = Tracker(
-        height_m,
-        camera,
-        fov_deg=fov_deg,
-        gait=gait,
-        adapt=adapt,
-        start_frames=start_frames,
-        treadmill=treadmill,
-        compensate_gain=compensate_gain,
-        background=background,
-        steady=steady,
-        measure=measure,
-        full_gradient=full_gradient,
-        full_velocity=full_velocity,
-        part_weights=part_weights,
-    )
-    _feed(tracker, frames, times_s, fps, boxes, progress)
-    return tracker.finish()
+    def tracked(reach_px: tuple[int, int, int, int] | None) -> Track:
+        tracker = Tracker(
+            height_m,
+            camera,
+            fov_deg=fov_deg,
+            gait=gait,
+            adapt=adapt,
+            start_frames=start_frames,
+            treadmill=treadmill,
+            compensate_gain=compensate_gain,
+            background=background,
+            steady=steady,
+            measure=measure,
+            full_gradient=full_gradient,
+            full_velocity=full_velocity,
+            part_weights=part_weights,
+            reach_px=reach_px,
+        )
+        _feed(tracker, frames, times_s, fps, boxes, progress)
+        return tracker.finish()
+
+    first = tracked(reach_px)
+    wider_px = first.camera_motion.wider_px
+    is_read_once = any(given is not None and iter(given) is given for given in (frames, times_s, boxes))
+    return first if reach_px is not None or wider_px is None or is_read_once else tracked(wider_px)
 
 
 def fit_walk(

@@ -80,6 +80,9 @@ pub struct WalkRecord<'py> {
     /// Rotation vectors of the camera, unless it stood still.
     #[pyo3(default)]
     camera_turn_rad: Option<Vec<[f64; 3]>>,
+    /// The camera of the frames, if `camera` is that of steadied pictures that are larger.
+    #[pyo3(default)]
+    frame_camera: Option<Bound<'py, PyDict>>,
 }
 
 impl<'py> WalkRecord<'py> {
@@ -119,6 +122,11 @@ impl<'py> WalkRecord<'py> {
             drawn_heading_rad: each(rows, |r| r.heading_rad),
             drawn_posture_rad: each(rows, |r| r.posture.to_array()),
             camera_turn_rad: (!walk.camera_turns.is_empty()).then(turns),
+            frame_camera: walk
+                .frame_camera
+                .as_ref()
+                .map(|c| PyCamera(c.clone()).parameters(py))
+                .transpose()?,
         })
     }
 
@@ -268,6 +276,8 @@ pub struct Recorded {
     alone: HashSet<usize>,
     /// Rotation vectors of the camera by frame; empty if it stood still.
     turns: HashMap<usize, DVec3>,
+    /// The camera of the frames.
+    frame_camera: Camera,
 }
 
 impl Recorded {
@@ -291,8 +301,14 @@ impl Recorded {
         let turns = found.camera_turn_rad.iter().flatten().map(|turn| DVec3::from_array(*turn));
         let shared = found.shared.iter().flatten().copied();
         let frames = || found.frame.iter().copied();
+        let camera = PyCamera::from_parameters(&found.camera)?.0;
+        let frame_camera = match &found.frame_camera {
+            Some(parameters) => PyCamera::from_parameters(parameters)?.0,
+            None => camera.clone(),
+        };
         Ok(Self {
-            camera: PyCamera::from_parameters(&found.camera)?.0,
+            camera,
+            frame_camera,
             walker: Walker {
                 body: body(found.height_m, &found.proportions)?,
                 gait: Gait::from_samples(found.curves_rad.each_ref().map(Vec::as_slice)),
@@ -338,8 +354,8 @@ impl Recorded {
             visible_contours(&posed.cylinders, eye, &VisibilityOptions::DRAWN, &mut visible);
         }
         let camera = match self.turns.get(&frame) {
-            None => Cow::Borrowed(&self.camera),
-            Some(turn) => Cow::Owned(self.camera.turned(*turn)),
+            None => Cow::Borrowed(&self.frame_camera),
+            Some(turn) => Cow::Owned(self.frame_camera.turned(*turn)),
         };
         segments_with_parts(py, &visible, &camera)
     }

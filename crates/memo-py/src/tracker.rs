@@ -225,7 +225,7 @@ impl PyTracker {
     #[pyo3(signature = (
         height_m=None, camera=None, *, fov_deg=None, gait=None, adapt=true, start_frames=None, treadmill=None,
         compensate_gain=false, background=false, steady=true, measure=None, full_gradient=None, full_velocity=None,
-        part_weights=None
+        part_weights=None, reach_px=None
     ))]
     #[allow(clippy::too_many_arguments, reason = "keyword arguments in Python")]
     fn new(
@@ -243,6 +243,7 @@ impl PyTracker {
         full_gradient: Option<f32>,
         full_velocity: Option<f32>,
         part_weights: Option<[f32; 14]>,
+        reach_px: Option<Whole<[u32; 4]>>,
     ) -> PyResult<Self> {
         let mut options = TrackerOptions::default();
         match height_m {
@@ -264,7 +265,8 @@ impl PyTracker {
         }
         options.evidence.change.compensate_gain = compensate_gain;
         options.evidence.background = background.then(BackgroundOptions::default);
-        options.steady = steady.then(SteadyOptions::default);
+        let reach_px = reach_px.must_be("reach_px", "four whole numbers from 0 to 5000")?.unwrap_or_default();
+        options.steady = steady.then(|| SteadyOptions { reach_px, ..SteadyOptions::default() });
         options.evidence.flow = full_velocity.map(|_| FlowOptions::default());
         let similarity = &mut options.walk.similarity;
         if let Some(measure) = measure {
@@ -323,6 +325,11 @@ impl PyTracker {
     fn camera_motion(&self, py: Python<'_>) -> PyResult<Vec<Py<FrameMotion>>> {
         let motions = self.read(py, |tracker| tracker.camera_motions().cloned().collect::<Vec<_>>())?;
         objects(py, motions.iter().map(|motion| FrameMotion::of(py, motion)))
+    }
+
+    /// How far the frames of a camera that pans go on beyond the first one, pixels: left, top, right, bottom.
+    fn reach_px(&self, py: Python<'_>) -> PyResult<[u32; 4]> {
+        self.read(py, |tracker| tracker.reach_px())
     }
 
     /// Where a view of the camera ended.

@@ -217,7 +217,7 @@ result! {
         fit_problem: Option<String> =
             walk.fit.as_ref().and_then(|fit| fit.as_ref().err()).map(ToString::to_string),
         /// The camera, given or assumed.
-        camera: PyCamera = PyCamera(walk.camera.clone()),
+        camera: PyCamera = PyCamera(walk.first_camera().clone()),
         /// How the assumed camera is tilted; None if a camera was given.
         camera_tilt: Option<Py<CameraTilt>> =
             walk.tilt.as_ref().map(|tilt| Py::new(py, CameraTilt::of(py, tilt)?)).transpose()?,

@@ -440,6 +440,18 @@ impl Camera {
         Self { rotation: turned * self.rotation, translation: turned * self.translation, ..self.clone() }
     }
 
+    /// The same camera without its distortion, with an image that goes on beyond the borders of this one by so many pixels: left,
+    /// top, right and bottom.
+    #[must_use]
+    pub fn widened(&self, [left, top, right, bottom]: [u32; 4]) -> Self {
+        Self {
+            size: [self.size[0] + left + right, self.size[1] + top + bottom],
+            centre_px: self.centre_px + DVec2::new(f64::from(left), f64::from(top)),
+            distortion: Distortion::None,
+            ..self.clone()
+        }
+    }
+
     /// The matrix K of `h (u, v, 1)ᵀ = K x_cam`.
     pub(crate) fn intrinsics(&self) -> DMat3 {
         let (f, c) = (self.focal_px, self.centre_px);

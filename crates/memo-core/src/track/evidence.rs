@@ -301,20 +301,21 @@ impl EvidenceStream {
         self.steadier.iter().flat_map(|steadier| steadier.motions())
     }
 
-    /// Where a rectangle of a frame is in the camera of the first frame.
-    pub(crate) fn in_first_view(&self, frame: usize, r: &Rectangle, size: [usize; 2]) -> Rectangle {
+    /// Where a rectangle of a frame is in its steadied picture, whose size is given.
+    pub(crate) fn in_steadied(&self, frame: usize, r: &Rectangle, size: [usize; 2]) -> Rectangle {
         let Some(steadier) = &self.steadier else { return *r };
-        let corners = [[r.left, r.top], [r.right, r.top], [r.left, r.bottom], [r.right, r.bottom]];
-        let places = corners.map(|[x, y]| steadier.in_first_view(frame, DVec2::new(x as f64, y as f64)));
-        let last = DVec2::new(size[0] as f64, size[1] as f64) - 1.0;
-        let low = places.into_iter().fold(DVec2::INFINITY, DVec2::min).round().clamp(DVec2::ZERO, last);
-        let high = places.into_iter().fold(DVec2::NEG_INFINITY, DVec2::max).round().clamp(DVec2::ZERO, last);
-        Rectangle {
-            left: low.x as usize,
-            top: low.y as usize,
-            right: high.x as usize,
-            bottom: high.y as usize,
-        }
+        moved(r, size, |pixel| steadier.in_steadied(frame, pixel))
+    }
+
+    /// Where a rectangle of a steadied picture is in its frame, whose size is given.
+    pub(crate) fn in_frame(&self, frame: usize, r: &Rectangle, size: [usize; 2]) -> Rectangle {
+        let Some(steadier) = &self.steadier else { return *r };
+        moved(r, size, |pixel| steadier.in_frame(frame, pixel))
+    }
+
+    /// How far the frames of a camera that pans go on beyond the first one, pixels: left, top, right and bottom.
+    pub fn reach_px(&self) -> [u32; 4] {
+        self.steadier.as_ref().map_or([0; 4], Steadier::reach_px)
     }
 
     /// The views that have ended.
@@ -484,6 +485,16 @@ fn clear(mask: &mut Mask, unseen: &Mask) {
 fn change_options(options: &EvidenceOptions) -> [ChangeOptions; 2] {
     let min_threshold = options.rectangle_threshold.max(options.change.min_threshold);
     [options.change, ChangeOptions { min_threshold, ..options.change }]
+}
+
+/// The rectangle of the places of the corners of another one, in an image of this size.
+fn moved(r: &Rectangle, size: [usize; 2], place: impl Fn(DVec2) -> DVec2) -> Rectangle {
+    let corners = [[r.left, r.top], [r.right, r.top], [r.left, r.bottom], [r.right, r.bottom]];
+    let places = corners.map(|[x, y]| place(DVec2::new(x as f64, y as f64)));
+    let last = DVec2::new(size[0] as f64, size[1] as f64) - 1.0;
+    let low = places.into_iter().fold(DVec2::INFINITY, DVec2::min).round().clamp(DVec2::ZERO, last);
+    let high = places.into_iter().fold(DVec2::NEG_INFINITY, DVec2::max).round().clamp(DVec2::ZERO, last);
+    Rectangle { left: low.x as usize, top: low.y as usize, right: high.x as usize, bottom: high.y as usize }
 }
 
 #[cfg(test)]

@@ -164,7 +164,7 @@ pub struct Shot {
     pub frame: usize,
     /// Its time, seconds.
     pub time_s: f64,
-    /// Where the thing was, in the view of the first frame, pixels.
+    /// Where the thing was, pixels: of the frame in what a tracker returns, of the steadied picture before.
     pub rectangle: Rectangle,
 }
 

@@ -29,8 +29,11 @@ pub struct TrackedWalk {
     pub person: usize,
     /// Both twins with all their steps.
     pub walk: Walk,
-    /// The camera, given or assumed; of a camera that moves, in the first frame of its view.
+    /// The camera of the pictures in which the walk was tracked, given or assumed; of a camera that moves, in the first frame of
+    /// its view. [`TrackedWalk::first_camera`] is that of the frames.
     pub camera: Camera,
+    /// The camera of the first frame of the view, if the steadied pictures are larger than the frames.
+    pub frame_camera: Option<Camera>,
     /// Rotation vector of `frame_camera_from_first_camera` of each row, radians; empty if the camera stood still.
     pub camera_turns: Vec<DVec3>,
     /// How the assumed camera is tilted; `None` if a camera was given.
@@ -161,9 +164,14 @@ impl TrackedWalk {
     /// The camera of the frame of a row: its pixels are those of the frame as it was given.
     pub fn camera_of(&self, index: usize) -> Cow<'_, Camera> {
         match self.camera_turns.get(index).filter(|turn| **turn != DVec3::ZERO) {
-            None => Cow::Borrowed(&self.camera),
-            Some(turn) => Cow::Owned(self.camera.turned(*turn)),
+            None => Cow::Borrowed(self.first_camera()),
+            Some(turn) => Cow::Owned(self.first_camera().turned(*turn)),
         }
+    }
+
+    /// The camera, given or assumed, of the first frame of the view.
+    pub fn first_camera(&self) -> &Camera {
+        self.frame_camera.as_ref().unwrap_or(&self.camera)
     }
 
     /// Forward or backward walking.

@@ -31,6 +31,7 @@ mod on_the_spot;
 mod seeking;
 mod starting;
 mod unfollowed;
+mod wide;
 
 use super::active::Active;
 use super::candidate::{Candidate, MISSED_FRAMES, Seen};
@@ -45,6 +46,7 @@ use super::rate::{FrameRate, lasting};
 use super::result::TrackedWalk;
 use super::standing::Standing;
 use super::steady::{CameraMotion, Loss};
+
 use super::walk::FrameEdges;
 use crate::OptionError;
 use crate::calibrate::{TiltError, TiltEstimate};
@@ -131,10 +133,12 @@ pub struct SeekReport {
 /// A tracker for one stream of frames.
 #[derive(Debug)]
 pub struct Tracker {
-    /// As they were given, but numbers of frames are those of the frame rate.
+    /// As they were given, but numbers of frames are those of the frame rate, and camera and field of view those of the
+    /// steadied pictures, which may be larger than the frames.
     options: TrackerOptions,
-    /// Numbers of start and path frames as they were given.
-    given_frames: [usize; 2],
+    given: TrackerOptions,
+    /// Width and height of the frames, pixels, once there is one.
+    size: Option<[usize; 2]>,
     rate: FrameRate,
     /// What is sought is dropped after this many consecutive frames without it.
     most_missed: usize,
@@ -177,13 +181,13 @@ impl Tracker {
         options.check()?;
         let stream = options.evidence_stream();
         let longest_walk = options.fit.map_or(LONGEST_WALK, |fit| fit.longest.min(LONGEST_WALK));
-        let given_frames = [options.start_frames, options.path_frames];
         let order_of_heights = (0..=options.further_heights_m.len()).collect();
         Ok(Self {
+            given: options.clone(),
             options,
+            size: None,
             stream,
             backdrop: Backdrop::default(),
-            given_frames,
             rate: FrameRate::default(),
             most_missed: MISSED_FRAMES,
             candidates: Vec::new(),
@@ -212,11 +216,15 @@ impl Tracker {
             return Err(TrackError::Finished);
         }
         self.check_camera(frame)?;
+        if self.size.is_none() {
+            self.size = Some([frame.width(), frame.height()]);
+            self.widen([frame.width() as u32, frame.height() as u32]);
+        }
         let evidence = self.stream.push(frame, time_s)?;
         self.report.frames += 1;
         if let Some(every_s) = self.rate.push(time_s) {
-            let [start_frames, path_frames] = self.given_frames.map(|count| lasting(count, every_s));
-            (self.options.start_frames, self.options.path_frames) = (start_frames, path_frames);
+            self.options.start_frames = lasting(self.given.start_frames, every_s);
+            self.options.path_frames = lasting(self.given.path_frames, every_s);
             self.most_missed = lasting(MISSED_FRAMES, every_s);
         }
         if let Some(loss) = self.stream.take_loss() {
@@ -288,9 +296,10 @@ impl Tracker {
         people
     }
 
-    /// The options in use.
+    /// The options as they were given.
+    #[allow(clippy::misnamed_getters, reason = "those in use depend on the frames")]
     pub fn options(&self) -> &TrackerOptions {
-        &self.options
+        &self.given
     }
 
     /// Counts of candidates and refused starts so far.
@@ -306,7 +315,18 @@ impl Tracker {
     /// Who or what moved and was not followed, with the reason, in order of the first frames. The list is complete after
     /// [`Tracker::finish`]; before, it has those who are gone. Of a long stream it has the 100 who were seen longest.
     pub fn left_out(&self) -> Vec<LeftOut> {
-        self.unfollowed.left_out()
+        let Some(size) = self.size else { return Vec::new() };
+        let mut left_out = self.unfollowed.left_out();
+        for shot in left_out.iter_mut().flat_map(|left| &mut left.shots) {
+            shot.rectangle = self.stream.in_frame(shot.frame, &shot.rectangle, size);
+        }
+        left_out
+    }
+
+    /// How far the frames of a camera that pans go on beyond the first one, pixels: left, top, right and bottom. People there
+    /// are followed if [`SteadyOptions::reach_px`](super::steady::SteadyOptions::reach_px) is as large.
+    pub fn reach_px(&self) -> [u32; 4] {
+        self.stream.reach_px()
     }
 
     /// What was found of the camera in the latest frames.
@@ -320,7 +340,7 @@ impl Tracker {
     }
 
     fn check_camera(&self, frame: &Frame<'_>) -> Result<(), TrackError> {
-        let Some(camera) = &self.options.camera else { return Ok(()) };
+        let Some(camera) = &self.given.camera else { return Ok(()) };
         let (width, height) = (frame.width(), frame.height());
         let [camera_width, camera_height] = camera.size;
         if (width, height) == (camera_width as usize, camera_height as usize) {
@@ -335,7 +355,7 @@ impl Tracker {
     /// 4. Changes that nobody explains may be somebody else.
     fn advance(&mut self, evidence: &Evidence) -> Result<(), TrackError> {
         if self.options.fit.is_some() {
-            self.backdrop.push(evidence.frame, &evidence.grey);
+            self.backdrop.push(evidence.frame, &evidence.grey, evidence.unseen.as_ref());
         }
         let expected = self.expect(evidence);
         let given = self.given_boxes(evidence);

@@ -199,7 +199,8 @@ impl TrackedWalk {
         if pictures.len() != steps.len() {
             return Err(FitError::Pictures { got: pictures.len(), wanted: steps.len() });
         }
-        let wanted = self.camera.size.map(|side| side as usize);
+        let frame_camera = self.first_camera();
+        let wanted = frame_camera.size.map(|side| side as usize);
         let others = |picture: &&Image<u8>| [picture.width(), picture.height()] != wanted;
         if let Some(other) = pictures.iter().chain(empty).find(others) {
             return Err(FitError::PictureSize { got: [other.width(), other.height()], wanted });
@@ -207,18 +208,27 @@ impl TrackedWalk {
         if self.is_frontal {
             return Err(FitError::Frontal);
         }
-        let turned_back = |k: usize| match self.camera_turns.get(k) {
-            Some(turn) if *turn != DVec3::ZERO => {
-                steady::turned_back(&pictures[k], &self.camera, *turn, empty.unwrap_or(&pictures[0]))
+        let in_canvas = |picture: &Image<u8>, turn: DVec3, beyond: &Image<u8>| {
+            steady::turned_back(picture, frame_camera, &self.camera, turn, beyond)
+        };
+        let is_wide = self.frame_camera.is_some();
+        let [wide, high] = self.camera.size.map(|side| side as usize);
+        let beyond = is_wide
+            .then(|| in_canvas(empty.unwrap_or(&pictures[0]), DVec3::ZERO, &Image::filled(wide, high, 0)).0);
+        let beyond = beyond.as_ref().unwrap_or(empty.unwrap_or(&pictures[0]));
+        let turned_back = |k: usize| match self.camera_turns.get(k).copied().unwrap_or_default() {
+            turn if turn != DVec3::ZERO || is_wide => {
+                let (picture, unseen) = in_canvas(&pictures[k], turn, beyond);
+                (picture, Some(unseen))
             }
-            _ => pictures[k].clone(),
+            _ => (pictures[k].clone(), None),
         };
         // 2. The part around the person, and the empty scene behind it.
         let mut backdrop = Backdrop::default();
         let mut pieces = Vec::with_capacity(steps.len());
         for (k, step) in steps.iter().enumerate() {
-            let picture = turned_back(k);
-            backdrop.push(k, &picture);
+            let (picture, unseen) = turned_back(k);
+            backdrop.push(k, &picture, unseen.as_ref());
             backdrop.occupy(k, step.look.window);
             if step.by_feet {
                 continue;
@@ -227,7 +237,7 @@ impl TrackedWalk {
             pieces.push(Piece { crown_px: self.crowns_px.get(k).copied().flatten(), ..piece });
         }
         let views = match empty {
-            Some(empty) => pieces.into_iter().map(|piece| piece.before(empty)).collect(),
+            Some(_) => pieces.into_iter().map(|piece| piece.before(beyond)).collect(),
             None if self.is_on_treadmill => backdrop.views_on_the_spot(pieces.iter()),
             None => backdrop.views(pieces.iter()),
         };

@@ -4,10 +4,11 @@
 //! grow with the stream: when there are too many frames, every second one is dropped.
 
 use super::edge_search::View;
-use crate::image::{Image, Rectangle};
+use crate::image::{Image, Mask, Rectangle};
 use crate::model::EllipticCylinder;
 use crate::track::locate::Sighting;
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// The empty scene is the median of half this many frames to this many.
 const MOST_FRAMES: usize = 32;
@@ -27,6 +28,8 @@ pub struct Backdrop {
 struct Kept {
     frame: usize,
     image: Image<u8>,
+    /// The columns of each row that the frame shows, all if empty.
+    shown: Vec<Range<usize>>,
     people: Vec<Rectangle>,
 }
 
@@ -90,13 +93,14 @@ fn cut(image: &Image<u8>, part: &Rectangle) -> Image<u8> {
 }
 
 impl Backdrop {
-    /// Adds the next frame of the stream.
-    pub fn push(&mut self, frame: usize, image: &Image<u8>) {
+    /// Adds the next frame of the stream, with the pixels that it does not show.
+    pub fn push(&mut self, frame: usize, image: &Image<u8>, unseen: Option<&Mask>) {
         let every = self.every.max(1);
         if !frame.is_multiple_of(every) {
             return;
         }
-        self.frames.push(Kept { frame, image: image.clone(), people: Vec::new() });
+        let shown = unseen.map_or_else(Vec::new, shown_columns);
+        self.frames.push(Kept { frame, image: image.clone(), shown, people: Vec::new() });
         if self.frames.len() > MOST_FRAMES {
             self.every = 2 * every;
             self.frames.retain(|kept| kept.frame.is_multiple_of(2 * every));
@@ -159,15 +163,13 @@ impl Backdrop {
     /// One row of the empty scene: the median of the frames in which people are elsewhere, or of all frames where
     /// these are too few.
     fn empty_row(&self, y: usize, whole: &Rectangle, least: usize) -> Vec<u8> {
-        let rows: Vec<&[u8]> =
-            self.frames.iter().map(|kept| &kept.image.row(y)[whole.left..=whole.right]).collect();
+        let rows: Vec<Part<'_>> = self.frames.iter().map(|kept| shown_part(kept, y, whole)).collect();
         let with_people = rows.iter().zip(&self.frames);
         let free: Vec<Part<'_>> =
-            with_people.flat_map(|(row, kept)| free_parts(row, y, whole.left, &kept.people)).collect();
+            with_people.flat_map(|(row, kept)| free_parts(*row, y, whole.left, &kept.people)).collect();
         let (mut empty, counts) = medians(&free, whole.width());
         if counts.iter().any(|&count| usize::from(count) < least) {
-            let all: Vec<Part<'_>> = rows.into_iter().map(|row| (0, row)).collect();
-            let of_all = medians(&all, whole.width()).0;
+            let of_all = medians(&rows, whole.width()).0;
             let few = empty.iter_mut().zip(&counts).zip(of_all);
             few.filter(|((_, count), _)| usize::from(**count) < least)
                 .for_each(|((empty, _), all)| *empty = all);
@@ -179,9 +181,28 @@ impl Backdrop {
 /// Some columns of a row, from the first of them on.
 type Part<'a> = (usize, &'a [u8]);
 
-/// The parts of a row in which nobody is; its first column is `left`.
-fn free_parts<'a>(row: &'a [u8], y: usize, left: usize, people: &[Rectangle]) -> Vec<Part<'a>> {
-    let mut parts = vec![(0, row)];
+/// The columns of each row that a frame shows. A turned picture is convex, so they are next to each other.
+fn shown_columns(unseen: &Mask) -> Vec<Range<usize>> {
+    let columns = |y: usize| {
+        let row = unseen.row(y);
+        let first = row.iter().position(|unseen| !unseen).unwrap_or(row.len());
+        first..row.iter().rposition(|unseen| !unseen).map_or(first, |last| last + 1)
+    };
+    (0..unseen.height()).map(columns).collect()
+}
+
+/// What a frame shows of a row within the columns of a rectangle.
+fn shown_part<'a>(kept: &'a Kept, y: usize, whole: &Rectangle) -> Part<'a> {
+    let row = kept.image.row(y);
+    let shown = kept.shown.get(y).cloned().unwrap_or(0..row.len());
+    let within = |x: usize| x.clamp(whole.left, whole.right + 1);
+    let (from, to) = (within(shown.start), within(shown.end));
+    (from - whole.left, &row[from..to])
+}
+
+/// The parts of some columns of a row in which nobody is; the first column of the whole row is `left`.
+fn free_parts<'a>(row: Part<'a>, y: usize, left: usize, people: &[Rectangle]) -> Vec<Part<'a>> {
+    let mut parts = vec![row];
     for window in people.iter().filter(|w| (w.top..=w.bottom).contains(&y)) {
         let [from, to] = [window.left, window.right + 1].map(|x| x.saturating_sub(left));
         let beside = |(start, columns): Part<'a>| {
@@ -244,7 +265,7 @@ mod tests {
         let seen = piece.clone().with_crown(Some(&sighting));
         for frames in [0, 4] {
             let mut backdrop = Backdrop::default();
-            (0..frames).for_each(|k| backdrop.push(k, &frame(k)));
+            (0..frames).for_each(|k| backdrop.push(k, &frame(k), None));
             assert_eq!(backdrop.views([&seen].into_iter())[0].crown_px, Some(12.0));
             assert_eq!(backdrop.views_on_the_spot([&seen].into_iter())[0].crown_px, None);
         }
@@ -257,7 +278,7 @@ mod tests {
         for frames in [8, 50] {
             let mut backdrop = Backdrop::default();
             for k in 0..frames {
-                backdrop.push(k, &frame(k));
+                backdrop.push(k, &frame(k), None);
                 backdrop.occupy(k, window(k));
             }
             let pieces: Vec<Piece> =
@@ -299,7 +320,7 @@ mod tests {
         for frames in [0, 1, 2, 9] {
             let mut backdrop = Backdrop::default();
             for k in 0..frames {
-                backdrop.push(k, &image(k));
+                backdrop.push(k, &image(k), None);
                 people(k).into_iter().for_each(|window| backdrop.occupy(k, window));
             }
             for (y, least) in (0..6).flat_map(|y| [(y, 1), (y, 5)]) {
@@ -320,10 +341,27 @@ mod tests {
         }
     }
 
+    /// A frame that does not show a pixel has no say there.
+    #[test]
+    fn the_empty_scene_is_that_of_the_frames_that_show_it() {
+        let mut backdrop = Backdrop::default();
+        for k in 0..9 {
+            let mut unseen = Image::filled(200, 60, false);
+            (0..60).for_each(|y| unseen.row_mut(y)[20 * k + 40..].fill(true));
+            let mut seen = frame(k);
+            (0..60).for_each(|y| seen.row_mut(y)[20 * k + 40..].fill(7));
+            backdrop.push(k, &seen, Some(&unseen));
+            backdrop.occupy(k, window(k));
+        }
+        let whole = Rectangle { left: 0, right: 199, top: 0, bottom: 59 };
+        let row = backdrop.empty_row(30, &whole, 1);
+        assert!((0..200).all(|x| usize::from(row[x]) == 40 + 10 * (x / 8 % 3)), "{row:?}");
+    }
+
     #[test]
     fn behind_somebody_who_stays_is_what_was_seen_before_or_nothing() {
         let mut backdrop = Backdrop::default();
-        (0..8).for_each(|k| backdrop.push(k, &frame(k)));
+        (0..8).for_each(|k| backdrop.push(k, &frame(k), None));
         let place = window(2).union(&window(7));
         (2..8).for_each(|k| backdrop.occupy(k, place));
         let walk: Vec<Piece> = (2..8).map(|k| Piece::new(k, &frame(k), place, Vec::new())).collect();
@@ -334,12 +372,12 @@ mod tests {
         let grey = |x: usize| (40 + 10 * (x / 8 % 3)) as u8;
         assert!((40..50).all(|x| pixels.row(20 - corner[1])[x - corner[0]][1] == grey(x)));
         let mut always = Backdrop::default();
-        (2..8).for_each(|k| always.push(k, &frame(k)));
+        (2..8).for_each(|k| always.push(k, &frame(k), None));
         let views = always.views_on_the_spot(walk.iter());
         assert!(views.len() == 6 && views.iter().all(|view| !view.is_empty_known));
         // Nor do frames of an earlier walk in the same place show the scene behind it.
         let mut earlier = Backdrop::default();
-        (0..8).for_each(|k| earlier.push(k, &frame(k)));
+        (0..8).for_each(|k| earlier.push(k, &frame(k), None));
         (0..8).for_each(|k| earlier.occupy(k, place));
         assert!(earlier.views_on_the_spot(walk.iter()).iter().all(|view| !view.is_empty_known));
         assert!(
@@ -350,7 +388,7 @@ mod tests {
     #[test]
     fn frames_of_a_long_stream_are_thinned_evenly() {
         let mut backdrop = Backdrop::default();
-        (0..1000).for_each(|k| backdrop.push(k, &Image::filled(2, 2, 0)));
+        (0..1000).for_each(|k| backdrop.push(k, &Image::filled(2, 2, 0), None));
         let kept: Vec<usize> = backdrop.frames.iter().map(|f| f.frame).collect();
         assert!((MOST_FRAMES / 2..=MOST_FRAMES).contains(&kept.len()), "{}", kept.len());
         assert!(kept.windows(2).all(|w| w[1] - w[0] == backdrop.every), "{kept:?}");

@@ -54,6 +54,7 @@ fn followed(path: Path, frames: &[(f64, Option<Hypothesis>)], options: WalkOptio
 pub fn tracked(walk: Walk, start: StartReport, options: WalkOptions) -> TrackedWalk {
     TrackedWalk {
         person: 0,
+        frame_camera: None,
         camera_turns: Vec::new(),
         average: walk.walker.clone(),
         walk,

@@ -4,7 +4,8 @@
 //!    (`template`), from coarse to fine (`pyramid`), with weights that leave out people (`estimate`; Baker and Matthews
 //!    2004, *Lucas-Kanade 20 Years On*, inverse compositional). It starts at the rotation of the frame before.
 //! 2. If the picture has moved by [`SteadyOptions::still_px`] or more, it is interpolated in the camera of the first
-//!    frame (`warp`). Otherwise it is left as it is, bit for bit: a tripod costs the estimate only.
+//!    frame (`warp`). Otherwise it is left as it is, bit for bit: a tripod costs the estimate only. For a camera that pans, the
+//!    steadied pictures may be larger than the frames (`canvas`).
 //! 3. A frame that overlaps the key frame little, or agrees with it less and less, becomes the next key frame; its rotation
 //!    is chained with that of the key frame before.
 //! 4. If a frame and those after it agree with each other but not with the key frames, the shot has changed. If the focal
@@ -20,6 +21,7 @@
 //! motions of several pixels per frame may be missed, because its coarse scales show nothing, and somebody who covers a third of the
 //! picture may be taken for the wall.
 
+mod canvas;
 mod estimate;
 mod pyramid;
 mod template;
@@ -29,13 +31,15 @@ use crate::OptionError;
 use crate::image::{Frame, FrameError, Image, Mask};
 use crate::model::{Camera, assumed_field_of_view_rad};
 use crate::wording::counted;
+pub(crate) use canvas::turned_back;
+
+use canvas::Canvas;
 use estimate::{Comparison, Estimate};
 use glam::{DMat3, DQuat, DVec2, DVec3};
 use pyramid::Pyramid;
 use std::collections::VecDeque;
 use template::{Template, pixel_of};
 use thiserror::Error;
-use warp::Warp;
 
 /// Rotation from the first view's camera to that of a frame.
 pub type Turned = DMat3;
@@ -74,11 +78,15 @@ pub struct SteadyOptions {
     /// Relative change of the focal length, as displacement of the corners in pixels, from which the picture is taken for
     /// zoomed. Default 3.
     pub most_zoom_px: f64,
+    /// How far the steadied pictures go on beyond the first frame, pixels: left, top, right and bottom. Default 0: what a camera
+    /// shows that has turned farther is cut off. [`Steadier::reach_px`] says how much a video needs. Without a given camera it
+    /// is the larger one of both sides.
+    pub reach_px: [u32; 4],
 }
 
 impl Default for SteadyOptions {
     fn default() -> Self {
-        Self { still_px: 0.3, least_support: 0.35, most_zoom_px: 3.0 }
+        Self { still_px: 0.3, least_support: 0.35, most_zoom_px: 3.0, reach_px: [0; 4] }
     }
 }
 
@@ -88,7 +96,17 @@ impl SteadyOptions {
         OptionError::unless_at_least_0("still_px", self.still_px)?;
         let is_share = self.least_support > 0.0 && self.least_support < 1.0;
         OptionError::unless(is_share, "least_support", "between 0 and 1", self.least_support)?;
-        OptionError::unless_positive("most_zoom_px", self.most_zoom_px)
+        OptionError::unless_positive("most_zoom_px", self.most_zoom_px)?;
+        let farthest = self.reach_px.into_iter().max().unwrap_or(0);
+        let is_possible = farthest <= MOST_REACH_PX;
+        OptionError::unless(is_possible, "reach_px", "at most 5000 pixels", f64::from(farthest))
+    }
+
+    /// The reach about an image of a camera that is given or assumed.
+    pub(crate) fn reach_about(&self, is_given: bool) -> [u32; 4] {
+        let [left, top, right, bottom] = self.reach_px;
+        let (aside, up) = (left.max(right), top.max(bottom));
+        if is_given { self.reach_px } else { [aside, up, aside, up] }
     }
 }
 
@@ -233,6 +251,12 @@ const MOST_KEYS: usize = 12;
 const MOST_MOTIONS: usize = 25_000;
 /// Losses kept.
 const MOST_LOSSES: usize = 100;
+/// A camera that moves by more than this from frame to frame is looked for where it would be if it went on, too, pixels.
+const PACE_PX: f64 = 0.5;
+/// A camera pans if it shows more than this share of a frame's side beyond the first frame. One that shakes shows less.
+const PAN_SHARE: f64 = 0.05;
+/// The largest [`SteadyOptions::reach_px`].
+const MOST_REACH_PX: u32 = 5_000;
 /// The coarsest level has about this many pixels along its shorter side.
 const COARSEST_PX: usize = 100;
 
@@ -246,12 +270,12 @@ struct Key {
     zoom: f64,
 }
 
-/// The first view: its camera, the picture and the grid of its rays.
+/// The first view: its camera, and its picture.
 #[derive(Debug)]
 struct View {
     camera: Camera,
-    warp: Warp,
     picture: Image<u8>,
+    canvas: Canvas,
 }
 
 /// Frames that do not agree with the key frames but may agree with each other.
@@ -276,6 +300,8 @@ pub struct Steadier {
     keys: Vec<Key>,
     last: Turned,
     last_support: f64,
+    /// Rotation from the frame before the last one to the last one.
+    pace: Turned,
     /// The coarsest scale of the last frame that a key frame explained.
     last_coarse: Option<Image<u8>>,
     other: Option<Other>,
@@ -288,6 +314,9 @@ pub struct Steadier {
     motions: VecDeque<CameraMotion>,
     losses: Vec<Loss>,
     news: Option<Loss>,
+    /// How far the frames go on beyond the first one, and whether that is more than shaking.
+    reach_px: [u32; 4],
+    pans: bool,
 }
 
 impl Steadier {
@@ -302,6 +331,7 @@ impl Steadier {
             keys: Vec::new(),
             last: DMat3::IDENTITY,
             last_support: 0.0,
+            pace: DMat3::IDENTITY,
             last_coarse: None,
             other: None,
             unexplained: 0,
@@ -312,6 +342,8 @@ impl Steadier {
             motions: VecDeque::new(),
             losses: Vec::new(),
             news: None,
+            reach_px: [0; 4],
+            pans: false,
         }
     }
 
@@ -360,16 +392,30 @@ impl Steadier {
         view.is_some_and(|view| alike_share(&view.picture.as_frame(), frame) >= ALIKE_SHARE)
     }
 
-    /// Where a pixel of a frame is in the camera of the first frame; the same pixel if the frame was left as it is.
-    pub fn in_first_view(&self, frame: usize, pixel: DVec2) -> DVec2 {
-        let motion = self.motions.iter().rev().find(|motion| motion.frame == frame);
-        let moved = motion.filter(|motion| motion.turn_rad != DVec3::ZERO).zip(self.view.as_ref());
-        let seen = |(motion, view): (&CameraMotion, &View)| {
-            let camera = &view.camera;
-            let ray = ((camera.undistort(pixel).ok()? - camera.centre_px) / camera.focal_px).extend(1.0);
-            pixel_of(camera, &motion.turned().transpose(), ray)
-        };
-        moved.and_then(seen).unwrap_or(pixel)
+    /// Where a pixel of a frame is in its steadied picture; the same pixel if the frame was left as it is.
+    pub fn in_steadied(&self, frame: usize, pixel: DVec2) -> DVec2 {
+        let at = |view: &View, turned: &Turned| view.canvas.pixel(&view.camera, turned, pixel);
+        self.moved(frame, at).unwrap_or(pixel)
+    }
+
+    /// Where a pixel of the steadied picture of a frame is in the frame.
+    pub fn in_frame(&self, frame: usize, pixel: DVec2) -> DVec2 {
+        let at = |view: &View, turned: &Turned| view.canvas.frame_pixel(&view.camera, turned, pixel);
+        self.moved(frame, at).unwrap_or(pixel)
+    }
+
+    /// A place that depends on the camera in a frame; `None` if the frame was left as it is.
+    fn moved(&self, frame: usize, at: impl Fn(&View, &Turned) -> Option<DVec2>) -> Option<DVec2> {
+        let view = self.view.as_ref()?;
+        let motion = self.motions.get(frame.checked_sub(self.motions.front()?.frame)?)?;
+        let is_as_given = motion.turn_rad == DVec3::ZERO && !view.canvas.is_wide();
+        if is_as_given { None } else { at(view, &motion.turned()) }
+    }
+
+    /// How far the frames so far go on beyond the first one if the camera pans, pixels: left, top, right and bottom; 0 if it does
+    /// not. A camera that has turned by more than 55 degrees shows parts that are not counted.
+    pub fn reach_px(&self) -> [u32; 4] {
+        if self.pans { self.reach_px } else { [0; 4] }
     }
 
     /// The camera in the frames so far, of the last 25 000 of them.
@@ -400,15 +446,19 @@ impl Steadier {
         let Some(camera) = self.given.clone().or_else(assumed).filter(|c| c.size == size) else { return };
         let Ok(template) = Template::new(pyramid, &camera) else { return };
         let key = Key { template, turned: DMat3::IDENTITY, zoom: 0.0 };
-        let warp = Warp::new(&camera);
-        self.begin(key, View { camera, warp, picture: frame.to_image() });
+        self.begin(key, self.view_of(camera, frame.to_image()));
         self.last_coarse = Some(pyramid.coarsest().to_image());
+    }
+
+    fn view_of(&self, camera: Camera, picture: Image<u8>) -> View {
+        let canvas = Canvas::new(&camera, self.options.reach_about(self.given.is_some()), &picture);
+        View { camera, picture, canvas }
     }
 
     fn begin(&mut self, key: Key, view: View) {
         self.view = Some(view);
         self.keys = vec![key];
-        self.last = DMat3::IDENTITY;
+        (self.last, self.pace) = (DMat3::IDENTITY, DMat3::IDENTITY);
         self.last_support = 0.0;
         self.other = None;
         (self.unexplained, self.fading, self.zooming) = (0, 0, 0);
@@ -425,8 +475,16 @@ impl Steadier {
         let is_trusted = self.unexplained >= FALLEN_FRAMES;
         let expected = if is_trusted { 0.0 } else { SUDDEN_FALL * self.last_support };
         let good = |estimate: &Estimate| estimate.is_supported(expected.max(self.options.least_support));
-        let of =
-            |key: usize, from: &Turned| comparison.near(&self.keys[key].template, from, usual).filter(good);
+        // A camera that pans goes on as it did. From where it was, an estimate may stay behind and lose more in each frame.
+        let ahead = matrix((1 + self.unexplained) as f64 * vector(&self.pace));
+        let pans = displacement_px(&view.camera, &ahead)[0] > PACE_PX;
+        let of = |key: usize, from: &Turned| {
+            let template = &self.keys[key].template;
+            let near = comparison.near(template, from, usual);
+            let further = pans.then(|| comparison.near(template, &(ahead * *from), usual)).flatten();
+            let found = [near, further].into_iter().flatten().max_by(|a, b| a.support.total_cmp(&b.support));
+            found.filter(good)
+        };
         let jumped = |key: usize, from: &Turned| {
             let found = of(key, &comparison.jump(&self.keys[key].template, from));
             found.filter(|estimate| estimate.support >= JUMP_SUPPORT)
@@ -462,7 +520,10 @@ impl Steadier {
     /// Takes over an estimate: rotation, zoom, and whether the frame becomes a key frame.
     fn follow(&mut self, number: usize, key: usize, estimate: &Estimate, pyramid: &Pyramid<'_>) {
         let Some(view) = &self.view else { return };
-        self.last = estimate.rotation * self.keys[key].turned;
+        let turned = estimate.rotation * self.keys[key].turned;
+        let frames = (1 + self.unexplained) as f64;
+        self.pace = matrix(vector(&(turned * self.last.transpose())) / frames);
+        self.last = turned;
         self.last_support = estimate.support;
         self.unexplained = 0;
         self.fading = if estimate.support < KEY_SUPPORT { self.fading + 1 } else { 0 };
@@ -553,8 +614,8 @@ impl Steadier {
             return;
         }
         match (other, self.view.take()) {
-            (Some(other), Some(View { camera, warp, .. })) => {
-                self.begin(other.key, View { camera, warp, picture: other.picture });
+            (Some(other), Some(View { camera, .. })) => {
+                self.begin(other.key, self.view_of(camera, other.picture));
             }
             _ => {
                 self.keys.clear();
@@ -577,10 +638,21 @@ impl Steadier {
             self.motions.pop_front();
         }
         self.motions.push_back(CameraMotion { frame: number, state, turn_rad, shift_px, support });
-        match &self.view {
+        match &mut self.view {
             _ if self.is_lost => Steadied::Lost,
-            Some(view) if is_moved => {
-                let (picture, unseen) = view.warp.steadied(frame, &view.camera, &self.last, &view.picture);
+            // Pictures of one stream are of one size.
+            None if self.options.reach_px != [0; 4] => Steadied::Lost,
+            Some(view) if is_moved || view.canvas.is_wide() => {
+                let turned = if is_moved { self.last } else { DMat3::IDENTITY };
+                // Through a lens, the first frame too may go on beyond its size.
+                let [own, needed] =
+                    [DMat3::IDENTITY, turned].map(|turned| view.canvas.reach_px(&view.camera, &turned));
+                for (k, side) in [0, 1, 0, 1].map(|k| f64::from(view.camera.size[k])).into_iter().enumerate()
+                {
+                    self.pans |= f64::from(needed[k]) - f64::from(own[k]) > PAN_SHARE * side;
+                    self.reach_px[k] = self.reach_px[k].max(own[k]).max(needed[k]);
+                }
+                let (picture, unseen) = view.canvas.steadied(frame, &view.camera, &turned);
                 Steadied::Moved { picture, unseen }
             }
             _ => Steadied::AsGiven,
@@ -670,16 +742,6 @@ fn shared_with(camera: &Camera, turned: &Turned) -> f64 {
 /// Rotation vector of a rotation.
 fn vector(turned: &Turned) -> DVec3 {
     DQuat::from_mat3(turned).normalize().to_scaled_axis()
-}
-
-/// A picture of a camera that has turned, in the camera of the first view; what it does not show is that of `beyond`.
-pub(crate) fn turned_back(
-    picture: &Image<u8>,
-    camera: &Camera,
-    turn_rad: DVec3,
-    beyond: &Image<u8>,
-) -> Image<u8> {
-    Warp::new(camera).steadied(&picture.as_frame(), camera, &matrix(turn_rad), beyond).0
 }
 
 /// The rotation of a rotation vector.

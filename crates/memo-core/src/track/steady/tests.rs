@@ -123,8 +123,8 @@ fn a_turned_frame_is_turned_back() {
     let ray = ((pixel - camera.centre_px) / camera.focal_px).extend(1.0);
     let seen = turned.turned.transpose() * ray;
     let expected = seen.truncate() / seen.z * camera.focal_px + camera.centre_px;
-    assert!(steadier.in_first_view(1, pixel).distance(expected) < 0.1 && pixel.distance(expected) > 3.0);
-    assert_eq!([steadier.in_first_view(0, pixel), steadier.in_first_view(7, pixel)], [pixel; 2]);
+    assert!(steadier.in_steadied(1, pixel).distance(expected) < 0.1 && pixel.distance(expected) > 3.0);
+    assert_eq!([steadier.in_steadied(0, pixel), steadier.in_steadied(7, pixel)], [pixel; 2]);
     let mut square = (0.0, 0.0);
     for (k, (a, b)) in picture.pixels().iter().zip(first.pixels()).enumerate() {
         let pixel = DVec2::new((k % 320) as f64, (k / 320) as f64);
@@ -285,7 +285,7 @@ fn places_are_turned_back_in_an_unknown_frame_too() {
     let (steadied, motion) = pushed(&mut steadier, &Image::filled(320, 240, 0));
     assert!(matches!(steadied, Steadied::Moved { .. }) && motion.state == CameraState::Unknown);
     let pixel = DVec2::new(160.0, 120.0);
-    let [known, unknown] = [1, 2].map(|frame| steadier.in_first_view(frame, pixel));
+    let [known, unknown] = [1, 2].map(|frame| steadier.in_steadied(frame, pixel));
     assert!(known.distance(pixel) > 10.0 && known.distance(unknown) < 1e-9, "{known} {unknown}");
 }
 
@@ -389,6 +389,82 @@ fn a_pan_is_chained_over_key_frames() {
     assert!(worst < 0.5, "{worst} px");
 }
 
+/// A pan of 24 px per frame: the picture is looked for where it would be if the camera went on.
+#[test]
+fn a_fast_pan_goes_on_as_it_did() {
+    let camera = camera();
+    let mut steadier = steadier(Some(&camera));
+    let (mut pan, mut worst) = (0.0f64, 0.0f64);
+    for k in 0..20 {
+        pan += 0.005 * f64::from(k.min(14));
+        let motion = pushed(&mut steadier, &Shot::of(&camera, [0.0, pan, 0.0]).plain()).1;
+        worst = worst.max(apart_px(&camera, &motion.turned(), &matrix(DVec3::Y * pan)));
+        assert!(motion.state != CameraState::Unknown, "{k}: {motion:?}");
+    }
+    assert!(worst < 0.5, "{worst} px");
+}
+
+/// In larger pictures, what a camera shows beyond the first frame is where its rays meet the first view's camera, and known to be
+/// unseen elsewhere.
+#[test]
+fn larger_pictures_show_what_the_camera_turned_to() {
+    let lens = Distortion::Brown { k1: -0.2, k2: 0.05, p1: 0.001, p2: -0.001, k3: 0.0 };
+    for distortion in [Distortion::None, lens] {
+        let camera = Camera { distortion, ..camera() };
+        let shot = |turn: [f64; 3]| Shot { noise: 0.0, ..Shot::of(&camera, turn) };
+        let turns: Vec<[f64; 3]> =
+            (0..7).map(f64::from).map(|k| [0.03 * (0.9 * k).sin(), 0.04 * k, 0.003 * k]).collect();
+        let mut small = steadier(Some(&camera));
+        turns.iter().for_each(|turn| drop(pushed(&mut small, &shot(*turn).plain())));
+        // 1. The reach is where the borders of all frames are.
+        let reach_px = small.reach_px();
+        let mut most = [0.0f64; 4];
+        for (turn, k) in turns.iter().flat_map(|turn| (0..=240).map(move |k| (turn, f64::from(k)))) {
+            for pixel in [
+                DVec2::new(0.0, k.min(239.0)),
+                DVec2::new(319.0, k.min(239.0)),
+                DVec2::new(k, 0.0),
+                DVec2::new(k, 239.0),
+            ] {
+                let ray =
+                    ((camera.undistort(pixel).unwrap() - camera.centre_px) / camera.focal_px).extend(1.0);
+                let first = matrix((*turn).into()).transpose() * ray;
+                let at = first.truncate() / first.z * camera.focal_px + camera.centre_px;
+                let beyond = [-at.x, -at.y, at.x - 319.0, at.y - 239.0];
+                most = std::array::from_fn(|side| most[side].max(beyond[side]));
+            }
+        }
+        for (reach_px, most) in reach_px.into_iter().zip(most) {
+            assert!((f64::from(reach_px) - most).abs() < 3.0, "{reach_px:?} {most:?}");
+        }
+        // 2. Each picture is the wall of the scene, as far as the frame shows it.
+        let options = SteadyOptions { reach_px, ..SteadyOptions::default() };
+        let mut wide = Steadier::new(options, Some(&camera), None);
+        let corner_px = DVec2::new(f64::from(reach_px[0]), f64::from(reach_px[1]));
+        for (frame, turn) in turns.into_iter().enumerate() {
+            let (Steadied::Moved { picture, unseen }, _) = pushed(&mut wide, &shot(turn).plain()) else {
+                panic!("left as it was")
+            };
+            let size = [320 + reach_px[0] + reach_px[2], 240 + reach_px[1] + reach_px[3]];
+            assert_eq!([picture.width(), picture.height()], size.map(|side| side as usize));
+            let (mut square, mut count) = (0.0, 0.0);
+            for y in 0..picture.height() {
+                for x in (0..picture.width()).filter(|x| !unseen.at(*x, y)) {
+                    let wall = DVec2::new(x as f64, y as f64) - corner_px;
+                    let off = f64::from(picture.at(x, y)) - texture(1, wall, 7.0).clamp(0.0, 255.0);
+                    (square, count) = (square + off * off, count + 1.0);
+                }
+            }
+            assert!((square / count).sqrt() < 2.5, "frame {frame}: {}", (square / count).sqrt());
+            assert!(count > 0.9 * 320.0 * 240.0, "frame {frame}: {count} pixels shown");
+            // 3. A pixel of the frame is found in the picture, and back.
+            let pixel = DVec2::new(250.0, 60.0);
+            let there = wide.in_steadied(frame, pixel);
+            assert!(wide.in_frame(frame, there).distance(pixel) < 1e-6, "frame {frame}");
+        }
+    }
+}
+
 #[test]
 fn one_thread_and_many_give_the_same() {
     let camera = camera();
@@ -412,6 +488,7 @@ fn options_outside_their_ranges_are_refused() {
         (SteadyOptions { still_px: f64::NAN, ..options }, "still_px"),
         (SteadyOptions { least_support: 1.0, ..options }, "least_support"),
         (SteadyOptions { most_zoom_px: 0.0, ..options }, "most_zoom_px"),
+        (SteadyOptions { reach_px: [0, 5001, 0, 0], ..options }, "reach_px"),
     ] {
         assert_eq!(wrong.check().unwrap_err().name, name);
     }

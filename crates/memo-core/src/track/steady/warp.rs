@@ -38,8 +38,8 @@ impl Warp {
         Self { rays: (0..across * down).map(ray).collect(), across, kernel: kernel() }
     }
 
-    /// The picture in the first view's camera, and the pixels that the frame does not show; those have the grey values
-    /// of `beyond`.
+    /// The picture in the camera of the nodes, and the pixels that the frame, of a camera turned from it, does not show; those
+    /// have the grey values of `beyond`.
     pub fn steadied(
         &self,
         frame: &Frame<'_>,
@@ -50,9 +50,9 @@ impl Warp {
         let place =
             |ray: &Option<DVec3>| ray.and_then(|ray| pixel_of(camera, turned, ray)).unwrap_or(DVec2::NAN);
         let places: Vec<DVec2> = self.rays.iter().map(place).collect();
-        let width = frame.width();
+        let width = beyond.width();
         let mut picture = beyond.clone();
-        let mut unseen = Image::filled(width, frame.height(), true);
+        let mut unseen = Image::filled(width, beyond.height(), true);
         let bands = picture.pixels_mut().par_chunks_mut(CELL_PX * width);
         bands.zip(unseen.pixels_mut().par_chunks_mut(CELL_PX * width)).enumerate().for_each(
             |(band, (greys, unseen))| {

@@ -200,6 +200,7 @@ impl Tracker {
             height: active.height_by(fit.as_ref().and_then(|fit| fit.as_ref().ok())),
             is_frontal: active.is_frontal(),
             walk: active.walk,
+            frame_camera: self.frame_camera(&active.camera),
             camera: active.camera,
             average: active.average,
             depth_sd_m: active.depth_sd_m,

@@ -189,7 +189,7 @@ impl Tracker {
         let size = [evidence.grey.width(), evidence.grey.height()];
         // Changes reach above the crown, and everything expects it of their rectangles.
         let place = |r: &Rectangle| {
-            let r = self.stream.in_first_view(evidence.frame, r, size);
+            let r = self.stream.in_steadied(evidence.frame, r, size);
             Rectangle { top: r.top.saturating_sub(MASK_MARGIN_PX as usize), ..r }
         };
         let mut boxes: Vec<Rectangle> = given.iter().map(place).collect();

@@ -1,0 +1,133 @@
+"""A camera that pans after a walker: drawn people before a textured wall, seen by a camera that turns in the same place."""
+
+import json
+from types import SimpleNamespace
+
+import cv2
+import memo
+import numpy as np
+import pytest
+from conftest import grey_video
+from memo.camera_motion import CameraMotion
+from memo.explain import explain
+
+WIDTH = 360
+
+
+def textured(frames):
+    """The same frames with a texture on all that does not move."""
+    frames = np.asarray(frames, float)
+    wall = np.random.default_rng(3).uniform(-1, 1, frames[0].shape).astype(np.float32)
+    wall = cv2.GaussianBlur(wall, None, 2.0)
+    empty = np.median(frames, axis=0)
+    for frame in frames:
+        moves = cv2.medianBlur((np.abs(frame - empty) > 14).astype(np.uint8), 5)
+        still = cv2.dilate(moves, np.ones((5, 5))) == 0
+        yield np.clip(frame + still * 18 / wall.std() * wall, 0, 255).astype(np.uint8)
+
+
+@pytest.fixture(scope="module", params=[0, 1])
+def panned(request):
+    """A scene, and its frames through a narrow camera that turns after the walker, with the camera of the first one."""
+    scene = memo.demo_scene(request.param)
+    given, truth = scene.camera.parameters(), scene.truth
+    matrix, height = np.array(given["matrix"]), scene.frames[0].shape[0]
+    from_world, shift = cv2.Rodrigues(np.array(given["rotation"]))[0], np.array(given["translation"])
+    narrow = matrix.copy()
+    narrow[0, 2] = (WIDTH - 1) / 2
+    torsos = np.stack([truth[f"{axis}_m"] for axis in "xyz"], axis=1) @ from_world.T + shift
+    aside = np.arctan2(torsos[:, 0], torsos[:, 2])
+    # As far as the wide picture goes.
+    most = np.arctan(matrix[0, 2] / matrix[0, 0]) - np.arctan(WIDTH / 2 / matrix[0, 0])
+    turns_rad = np.clip(np.interp(np.arange(len(scene.frames)), truth["frame"], aside), -most, most)
+    turned = [cv2.Rodrigues(np.array([0, -turn_rad, 0]))[0] for turn_rad in turns_rad]
+    frames = [
+        cv2.warpPerspective(frame, narrow @ turn @ np.linalg.inv(matrix), (WIDTH, height), flags=cv2.INTER_CUBIC)
+        for frame, turn in zip(textured(scene.frames), turned, strict=True)
+    ]
+    first = {
+        "size": [WIDTH, height],
+        "matrix": narrow.tolist(),
+        "rotation": cv2.Rodrigues(turned[0] @ from_world)[0].ravel().tolist(),
+        "translation": (turned[0] @ shift).tolist(),
+    }
+    camera = memo.Camera.from_parameters({**given, **first})
+    return SimpleNamespace(scene=scene, frames=frames, camera=camera, turned=turned, narrow=narrow)
+
+
+@pytest.fixture(scope="module")
+def track(panned):
+    return memo.track(panned.frames, fps=25, height_m=panned.scene.height_m, camera=panned.camera)
+
+
+def off_m(columns, truth):
+    """Root mean square errors along the world's axes."""
+    rows = np.searchsorted(truth["frame"], columns["frame"])
+    return [np.sqrt(np.mean((columns[f"{axis}_m"] - truth[f"{axis}_m"][rows]) ** 2)) for axis in "xyz"]
+
+
+def test_a_walker_is_followed_beyond_the_first_view(panned, track):
+    truth = panned.scene.truth
+    (walk,) = track.walks
+    columns = walk.columns
+    assert len(columns["frame"]) > 0.95 * len(panned.frames)
+    along, across, up = off_m(columns, truth)
+    assert along < 0.03 and across < 0.15 and up < 0.03, (along, across, up)
+    # Pixels are those of each frame, of OpenCV's projection.
+    given = panned.scene.camera.parameters()
+    for row in range(0, len(columns["frame"]), 10):
+        frame = columns["frame"][row]
+        turn = panned.turned[frame] @ cv2.Rodrigues(np.array(given["rotation"]))[0]
+        at = np.array([columns[f"right_hip_{axis}_m"][row] for axis in "xyz"])
+        seen = panned.narrow @ (turn @ at + panned.turned[frame] @ np.array(given["translation"]))
+        told = [columns[f"right_hip_{axis}_px"][row] for axis in "uv"]
+        assert np.hypot(*(seen[:2] / seen[2] - told)) < 1.5, frame
+    assert track.camera_motion.wider_px is None
+    assert not any("pans" in sentence for sentence in track.sentences)
+
+
+def test_frames_that_are_read_once_are_tracked_in_the_first_view(panned, track):
+    given = {"fps": 25, "height_m": panned.scene.height_m, "camera": panned.camera}
+    once = memo.track(iter(panned.frames), **given)
+    wider_px = once.camera_motion.wider_px
+    assert wider_px is not None and max(wider_px) > 200 and len(once) < 0.8 * len(track)
+    (said,) = (sentence for sentence in once.sentences if sentence.startswith("The camera pans"))
+    assert f"reach_px={wider_px}" in said
+    # Whoever asks for no more gets no more; with what is said to be needed it is the whole walk.
+    assert len(memo.track(panned.frames, **given, reach_px=(0, 0, 0, 0))) == len(once)
+    wide = memo.track(iter(panned.frames), **given, reach_px=wider_px)
+    np.testing.assert_array_equal(wide.columns["x_m"], track.columns["x_m"])
+    for left in once.left_out:
+        assert (left.boxes[:, 1] >= 0).all() and (left.boxes[:, 1] + left.boxes[:, 3] <= WIDTH).all(), left
+
+
+def test_the_person_is_fitted_again_to_the_frames(panned, track):
+    (walk,) = track.walks
+    again = memo.fit_walk(walk, panned.frames)
+    for name in ("right_hip_deg", "left_knee_deg"):
+        off = np.abs(again.columns[name] - walk.columns[name])
+        assert np.nanmedian(off) < 1.0, name
+
+
+def test_the_command_reads_the_video_again(panned, track, tmp_path, memo_command):
+    video, camera = tmp_path / "pan.mkv", tmp_path / "camera.toml"
+    grey_video(video, panned.frames)
+    names = ("size", "matrix", "distortions", "rotation", "translation")
+    given = panned.camera.parameters()
+    camera.write_text("[cam]\n" + "".join(f"{name} = {list(given[name])}\n" for name in names))
+    options = ["--camera", camera, "--height", panned.scene.height_m, "--out", tmp_path / "run"]
+    code, _, said = memo_command("track", video, *options)
+    assert code == 0
+    assert "the camera pans: tracking once more, in larger pictures" in said
+    run = json.loads((tmp_path / "run" / "run.json").read_text())
+    assert max(run["options"]["reach_px"]) > 200 and run["camera"]["size"] == [WIDTH, len(panned.frames[0])]
+    (why,) = explain(tmp_path / "run", [60])
+    assert why.frame == 60 and why.luma.shape[1] > WIDTH + 200
+
+
+def test_what_a_tracker_did_not_look_at_is_said_in_pixels_of_the_video():
+    motion = CameraMotion(shown_px=(0, 10, 200, 12), reach_px=(0, 10, 100, 20), shrink=2)
+    assert motion.wider_px == (0, 10, 200, 20)
+    (said,) = motion.sentences
+    assert "0 px to the left of the first frame, 20 above it, 400 to the right and 40 below" in said
+    assert CameraMotion(shown_px=(0, 10, 200, 12), reach_px=(0, 10, 200, 12)).wider_px is None
