@@ -35,6 +35,7 @@ from memo._memo import (
 )
 from memo.keypoints import Keypoints, KeypointsError, layouts, read_keypoints, write_keypoints
 from memo.linkage import PlanarFigure, planar
+from memo.panning import field_of_view
 from memo.postures import Postures, posture
 from memo.scene import DemoScene, demo_scene
 from memo.segment_lengths import read_lengths
@@ -62,6 +63,7 @@ __all__ = [
     "demo_scene",
     "edge_segments",
     "explain",
+    "field_of_view",
     "fit_walk",
     "foot_points",
     "gait",

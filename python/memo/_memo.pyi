@@ -427,10 +427,24 @@ class Steadier:
     """Steadies frames of a camera held in the hand, as `Tracker` does."""
 
     def __new__(
-        cls, camera: Camera | None = None, *, fov_deg: float | None = None, still_px: float | None = None
+        cls,
+        camera: Camera | None = None,
+        *,
+        fov_deg: float | None = None,
+        still_px: float | None = None,
+        reach_px: Sequence[int] | None = None,
     ) -> Self: ...
     def update(self, frame: npt.NDArray[np.uint8]) -> SteadiedFrame: ...
+    def reach_px(self) -> tuple[int, int, int, int]: ...
     def losses(self) -> list[LostView]: ...
+
+@final
+class FieldSeeker:
+    """Measures the field of view of a camera that pans; `memo.field_of_view` wraps it."""
+
+    def __new__(cls) -> Self: ...
+    def update(self, frame: npt.NDArray[np.uint8]) -> bool: ...
+    def found(self) -> tuple[float, float] | None: ...
 
 @final
 class Explainer:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -16,7 +16,7 @@ from memo.wording import counted
 if TYPE_CHECKING:
     from memo._memo import FrameMotion, LostView
 
-__all__ = ["CAMERA_MOTION_COLUMNS", "CameraMotion", "outcome", "write_camera_motion_csv"]
+__all__ = ["CAMERA_MOTION_COLUMNS", "CameraMotion", "FieldOfView", "outcome", "write_camera_motion_csv"]
 
 CAMERA_MOTION_COLUMNS = (
     *("frame", "state", "rx_rad", "ry_rad", "rz_rad", "shift_px", "shift_rms_px", "support"),
@@ -28,6 +28,15 @@ _UNEXPLAINED = 0.1
 """From this share of frames without a known turn, or with uneven light, on, they are reported. Of a zoom by
 5 % before a wall of bricks nine in ten frames have no known turn; of 25 recordings of a camera that stood
 still or shook, none has."""
+
+
+class FieldOfView(NamedTuple):
+    """How much of a scene a picture shows from its left to its right border."""
+
+    horizontal_deg: float
+    """The angle between the borders, degrees."""
+    sd_deg: float
+    """Its standard deviation."""
 
 
 @dataclass(frozen=True)
@@ -49,6 +58,8 @@ class CameraMotion:
     left, top, right and bottom; 0 of one that does not."""
     reach_px: tuple[int, int, int, int] = (0, 0, 0, 0)
     """How far the tracker looked there."""
+    field_of_view: FieldOfView | None = None
+    """The field of view of a camera that is not calibrated, if it was measured in a pan."""
 
     @property
     def columns(self) -> dict[str, npt.NDArray[Any]]:
@@ -114,6 +125,11 @@ class CameraMotion:
                 f"The camera moved: {where}the picture shifts by up to {summary['largest_px']:.1f} px "
                 f"({summary['rms_px']:.1f} px root mean square) against the first frame. "
                 f"Of {counted(len(self.rows), 'frame')}, {counted(steadied, 'was', 'were')} turned back."
+            )
+        if self.field_of_view is not None:
+            said.append(
+                f"The picture shows {self.field_of_view.horizontal_deg:.1f}° from left to right (standard "
+                f"deviation {self.field_of_view.sd_deg:.1f}°), as the camera's pan tells."
             )
         if (wider_px := self.wider_px) is not None:
             left, top, right, bottom = (side * self.shrink for side in wider_px)

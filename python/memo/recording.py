@@ -28,6 +28,7 @@ from memo.files import write_events_csv, write_track_csv
 from memo.gait import write_gait_parameters_csv
 from memo.given import Box, InputError, Point, check_apart, check_writable, nothing_at
 from memo.left_out import LeftOut
+from memo.panning import again
 from memo.run import NAME as RUN
 from memo.run import Source, write_run
 from memo.unfinished import new_folder
@@ -61,6 +62,7 @@ _DRAWN = (
 _LARGEST_PX = 1920  # longest tested side; for a walk enlarged to 2560 or more, the facing direction was wrong
 # So many unused bits are of a recording with fewer bits, or of a scene an eighth as bright as it could be.
 _FEW_BITS = 3
+_AGAIN = {"fov_deg": "with the field of view that the pan shows", "reach_px": "in larger pictures"}
 _OF_A_WALK = ("message", "start_s", "end_s", "direction", "gait", "p_swapped")
 
 Progress = Callable[[str, int, "int | None"], object]
@@ -198,6 +200,10 @@ def _track_recording(
         start, end = recording.frames
         return VideoReader(video, start=start, stop=end, rate_hz=recording.fps, shrink=recording.shrink)
 
+    def lumas() -> Iterator[npt.NDArray[np.uint8]]:
+        with opened() as frames:
+            yield from (frame.luma for frame in frames)
+
     with opened() as reader:
         options = _fitted(recording.options, reader)
         for doubt in _doubts(reader, "camera" in options):
@@ -215,12 +221,15 @@ def _track_recording(
         tracker, place = memo.Tracker(**options), recording.follow
         boxes = None if recording.boxes is None else _boxes(recording.boxes, reader)
         recorded = follow(reader, tracker, source, out, reader.frame_count, progress, stop, place, boxes)
-        wider_px = recorded.camera_motion.wider_px
-        if wider_px is not None and not recorded.interrupted:
-            remark(f"{video}: the camera pans: tracking once more, in larger pictures")
-            tracker = memo.Tracker(**options, reach_px=wider_px)
-            with opened() as again:
-                recorded = follow(again, tracker, source, out, again.frame_count, progress, stop, place, boxes)
+        while not recorded.interrupted:
+            changes = again(recorded.camera_motion, options, lumas)
+            if not changes:
+                break
+            remark(f"{video}: the camera pans: tracking again, {_AGAIN[min(changes)]}")
+            options |= changes
+            with opened() as once_more:
+                tracker, count = memo.Tracker(**options), once_more.frame_count
+                recorded = follow(once_more, tracker, source, out, count, progress, stop, place, boxes)
         if recorded.not_there is not None:
             remark(f"{video}: {recorded.not_there}")
         if reader.damage:

@@ -13,12 +13,13 @@ import numpy as np
 import numpy.typing as npt
 
 from memo import _memo
-from memo.camera_motion import CameraMotion
+from memo.camera_motion import CameraMotion, FieldOfView
 from memo.cycles import cycle_table, departure_sentences
 from memo.files import EVENT_COLUMNS, TRACK_COLUMNS
 from memo.gait import cadence_sentences, gait_table, lookup, symmetry_sentences
 from memo.left_out import LeftOut, left_out_sentences, over_ground, stays_in_place, too_far_apart
 from memo.notebook import table
+from memo.panning import again
 from memo.pixels import camera_of_video, columns_of_video, of_video
 from memo.plausible import (
     LIKELY_MISTAKEN,
@@ -85,7 +86,7 @@ class Tracker:
         height_m: float | Sequence[float] | None = None,
         camera: _memo.Camera | None = None,
         *,
-        fov_deg: float | None = None,
+        fov_deg: float | FieldOfView | None = None,
         gait: str | None = None,
         adapt: bool = True,
         start_frames: int | None = None,
@@ -99,6 +100,9 @@ class Tracker:
         part_weights: Sequence[float] | None = None,
         reach_px: tuple[int, int, int, int] | None = None,
     ) -> None:
+        self._field_of_view = fov_deg if isinstance(fov_deg, FieldOfView) else None
+        if isinstance(fov_deg, FieldOfView):
+            fov_deg = fov_deg.horizontal_deg
         self.options: dict[str, Any] = {
             "height_m": height_m,
             "fov_deg": fov_deg,
@@ -160,6 +164,7 @@ class Tracker:
             camera_given=self._camera is not None,
             shown_px=self._core.reach_px(),
             reach_px=self.options["reach_px"] or (0, 0, 0, 0),
+            field_of_view=self._field_of_view,
         )
         found = Track(
             self._walks,
@@ -189,7 +194,7 @@ def track(
     camera: _memo.Camera | None = None,
     boxes: Iterable[npt.ArrayLike] | None = None,
     progress: Callable[[int, int | None], object] | None = None,
-    fov_deg: float | None = None,
+    fov_deg: float | FieldOfView | None = None,
     gait: str | None = None,
     adapt: bool = True,
     start_frames: int | None = None,
@@ -211,19 +216,19 @@ def track(
     moves.
     `progress` is called with the number of frames done and the total, None if `frames` has no length;
     the options from `fov_deg` on are those of `Tracker`. Pixels in the result are those of the given frames.
-    Frames of a camera that pans are tracked a second time in larger pictures (`reach_px`), unless they can be
-    read only once.
+    Frames of a camera that pans are tracked again in larger pictures (`reach_px`), and without `camera` and
+    `fov_deg` with the field of view that the pan shows (`field_of_view`), unless they can be read only once.
     An interrupt (Ctrl-C) passes through; use `Tracker` to keep what was tracked until then.
     """
     if (times_s is None) == (fps is None):
         raise ValueError("give either times_s or fps")
     if fps is not None and not (np.isfinite(fps) and fps > 0):
         raise ValueError(f"fps must be a positive number, got {fps}")
-    def tracked(reach_px: tuple[int, int, int, int] | None) -> Track:
+    options = {"camera": camera, "fov_deg": fov_deg, "reach_px": reach_px}
+    is_read_once = any(given is not None and iter(given) is given for given in (frames, times_s, boxes))
+    while True:
         tracker = Tracker(
             height_m,
-            camera,
-            fov_deg=fov_deg,
             gait=gait,
             adapt=adapt,
             start_frames=start_frames,
@@ -235,15 +240,14 @@ def track(
             full_gradient=full_gradient,
             full_velocity=full_velocity,
             part_weights=part_weights,
-            reach_px=reach_px,
+            **options,
         )
         _feed(tracker, frames, times_s, fps, boxes, progress)
-        return tracker.finish()
-
-    first = tracked(reach_px)
-    wider_px = first.camera_motion.wider_px
-    is_read_once = any(given is not None and iter(given) is given for given in (frames, times_s, boxes))
-    return first if reach_px is not None or wider_px is None or is_read_once else tracked(wider_px)
+        found = tracker.finish()
+        changes = {} if is_read_once else again(found.camera_motion, options, lambda: frames)
+        if not changes:
+            return found
+        options |= changes
 
 
 def fit_walk(

@@ -92,7 +92,7 @@ mod _memo {
     #[pymodule_export]
     use super::score::similarity;
     #[pymodule_export]
-    use super::steady::{FrameMotion, LostView, PySteadier, SteadiedFrame};
+    use super::steady::{FrameMotion, LostView, PyFieldSeeker, PySteadier, SteadiedFrame};
     #[pymodule_export]
     use super::synth::{PyClothedScene, PyScene};
     #[pymodule_export]

@@ -5,8 +5,9 @@ use crate::camera::PyCamera;
 use crate::error::value_error;
 use crate::result::{objects, result};
 use crate::wait::pooled;
+use crate::whole::{Whole, WholeNumbers};
 use memo_core::OptionError;
-use memo_core::track::steady::{CameraMotion, Loss, Steadied, Steadier, SteadyOptions};
+use memo_core::track::steady::{CameraMotion, FieldSeeker, Loss, Steadied, Steadier, SteadyOptions};
 use numpy::PyArray2;
 use pyo3::prelude::*;
 
@@ -59,6 +60,9 @@ result! {
     |own| own.motion.get().__repr__()
 }
 
+/// What `reach_px` may be.
+pub const REACH: &str = "four whole numbers from 0 to 5000";
+
 /// Steadies a stream of frames, as `Tracker` does before it compares them.
 #[pyclass(name = "Steadier", module = "memo._memo")]
 pub struct PySteadier(Steadier);
@@ -67,14 +71,20 @@ pub struct PySteadier(Steadier);
 impl PySteadier {
     /// Without a camera, one of the field of view `fov_deg` is assumed.
     #[new]
-    #[pyo3(signature = (camera=None, *, fov_deg=None, still_px=None))]
-    fn new(camera: Option<PyCamera>, fov_deg: Option<f64>, still_px: Option<f64>) -> PyResult<Self> {
+    #[pyo3(signature = (camera=None, *, fov_deg=None, still_px=None, reach_px=None))]
+    fn new(
+        camera: Option<PyCamera>,
+        fov_deg: Option<f64>,
+        still_px: Option<f64>,
+        reach_px: Option<Whole<[u32; 4]>>,
+    ) -> PyResult<Self> {
         if let Some(got) = fov_deg.filter(|fov_deg| !(5.0..=170.0).contains(fov_deg)) {
             let wanted = "between 5 and 170 degrees";
             return Err(value_error(OptionError { name: "field of view", wanted, got }));
         }
         let mut options = SteadyOptions::default();
         options.still_px = still_px.unwrap_or(options.still_px);
+        options.reach_px = reach_px.must_be("reach_px", REACH)?.unwrap_or_default();
         options.check().map_err(value_error)?;
         Ok(Self(Steadier::new(options, camera.map(|c| c.0).as_ref(), fov_deg.map(f64::to_radians))))
     }
@@ -89,8 +99,40 @@ impl PySteadier {
         SteadiedFrame::of(py, motion, steadied)
     }
 
+    /// How far the frames of a camera that pans go on beyond the first one, pixels: left, top, right, bottom.
+    fn reach_px(&self) -> [u32; 4] {
+        self.0.reach_px()
+    }
+
     /// The views that have ended.
     fn losses(&self, py: Python<'_>) -> PyResult<Vec<Py<LostView>>> {
         objects(py, self.0.losses().iter().map(|loss| LostView::of(py, loss)))
+    }
+}
+
+/// Measures the field of view of a camera that pans, from a stream of frames.
+#[pyclass(name = "FieldSeeker", module = "memo._memo")]
+pub struct PyFieldSeeker(FieldSeeker);
+
+#[pymethods]
+impl PyFieldSeeker {
+    #[new]
+    fn new() -> Self {
+        Self(FieldSeeker::default())
+    }
+
+    /// Takes the next frame, (H, W) uint8. Returns whether further frames add anything.
+    fn update(&mut self, py: Python<'_>, frame: &Bound<'_, PyAny>) -> PyResult<bool> {
+        let array = frame_from_numpy(frame)?;
+        let frame = array.as_frame()?;
+        let seeker = &mut self.0;
+        pooled(py, || seeker.push(&frame))?.map_err(value_error)?;
+        Ok(!self.0.has_all())
+    }
+
+    /// The horizontal field of view and its standard deviation, degrees; None if the camera did not pan.
+    fn found(&self, py: Python<'_>) -> PyResult<Option<(f64, f64)>> {
+        let found = pooled(py, || self.0.found())?;
+        Ok(found.map(|field| (field.horizontal_rad.to_degrees(), field.sd_rad.to_degrees())))
     }
 }

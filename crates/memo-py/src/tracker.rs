@@ -5,7 +5,7 @@ use crate::camera::PyCamera;
 use crate::defaults::dict;
 use crate::error::{value_error, wrong_type};
 use crate::result::{objects, result};
-use crate::steady::{FrameMotion, LostView};
+use crate::steady::{FrameMotion, LostView, REACH};
 use crate::wait::{LOOK, watched};
 use crate::walk::Walk;
 use crate::whole::{Whole, WholeNumbers};
@@ -265,7 +265,7 @@ impl PyTracker {
         }
         options.evidence.change.compensate_gain = compensate_gain;
         options.evidence.background = background.then(BackgroundOptions::default);
-        let reach_px = reach_px.must_be("reach_px", "four whole numbers from 0 to 5000")?.unwrap_or_default();
+        let reach_px = reach_px.must_be("reach_px", REACH)?.unwrap_or_default();
         options.steady = steady.then(|| SteadyOptions { reach_px, ..SteadyOptions::default() });
         options.evidence.flow = full_velocity.map(|_| FlowOptions::default());
         let similarity = &mut options.walk.similarity;

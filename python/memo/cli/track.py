@@ -153,8 +153,9 @@ def _track(recording: Recording, delivery: Delivery) -> Exit:
         small = f"{width // source.shrink}x{height // source.shrink}"
         print(f"Tracked at {small} of the {width}x{height} pixels of the video (--shrink).")
     if not source.camera_given and delivery.talks and tracked:
+        known = "measured" if recorded.camera_motion.field_of_view else "assumed"
         print(
-            "No --camera: depths depend on the assumed field of view; heights and sideways positions do not."
+            f"No --camera: depths depend on the {known} field of view; heights and sideways positions do not."
         )
     return recorded.exit
 

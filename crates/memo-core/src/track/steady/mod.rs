@@ -23,6 +23,7 @@
 
 mod canvas;
 mod estimate;
+mod field;
 mod pyramid;
 mod template;
 mod warp;
@@ -32,6 +33,8 @@ use crate::image::{Frame, FrameError, Image, Mask};
 use crate::model::{Camera, assumed_field_of_view_rad};
 use crate::wording::counted;
 pub(crate) use canvas::turned_back;
+
+pub use field::{FieldOfView, FieldSeeker};
 
 use canvas::Canvas;
 use estimate::{Comparison, Estimate};
@@ -353,6 +356,12 @@ impl Steadier {
     ///
     /// The size of the frame differs from the frames before, or from that of the given camera.
     pub fn push(&mut self, frame: &Frame<'_>) -> Result<Steadied, FrameError> {
+        self.look(frame)?;
+        Ok(self.drawn(frame))
+    }
+
+    /// Finds the camera in the next frame.
+    fn look(&mut self, frame: &Frame<'_>) -> Result<(), FrameError> {
         let number = self.frames;
         let [width, height] = [frame.width(), frame.height()];
         let camera = self.view.as_ref().map(|view| &view.camera).or(self.given.as_ref());
@@ -368,7 +377,8 @@ impl Steadier {
             self.open(frame, &pyramid);
             let found = if self.view.is_some() { CameraState::Still } else { CameraState::Unknown };
             let support = if self.view.is_some() { 1.0 } else { f64::NAN };
-            return Ok(self.noted(number, found, support, frame));
+            self.note(number, found, support);
+            return Ok(());
         }
         let (found, support) = match self.compared(&pyramid) {
             Some((key, estimate)) => {
@@ -382,7 +392,8 @@ impl Steadier {
                 (CameraState::Unknown, f64::NAN)
             }
         };
-        Ok(self.noted(number, found, support, frame))
+        self.note(number, found, support);
+        Ok(())
     }
 
     /// True of a frame of the camera that has not moved, in which the light differs from place to place.
@@ -624,8 +635,8 @@ impl Steadier {
         }
     }
 
-    /// Records the camera in a frame, of which `found` says whether its rotation is known, and steadies the frame.
-    fn noted(&mut self, number: usize, found: CameraState, support: f64, frame: &Frame<'_>) -> Steadied {
+    /// Records the camera in a frame, of which `found` says whether its rotation is known.
+    fn note(&mut self, number: usize, found: CameraState, support: f64) {
         let shift_px = self.view.as_ref().map_or([0.0; 2], |view| displacement_px(&view.camera, &self.last));
         let is_moved = shift_px[0].is_nan() || shift_px[0] >= self.options.still_px;
         let state = match found {
@@ -638,12 +649,16 @@ impl Steadier {
             self.motions.pop_front();
         }
         self.motions.push_back(CameraMotion { frame: number, state, turn_rad, shift_px, support });
+    }
+
+    /// The frame whose camera was noted last, steadied.
+    fn drawn(&mut self, frame: &Frame<'_>) -> Steadied {
+        let turned = self.motions.back().map_or(DMat3::IDENTITY, CameraMotion::turned);
         match &mut self.view {
             _ if self.is_lost => Steadied::Lost,
             // Pictures of one stream are of one size.
             None if self.options.reach_px != [0; 4] => Steadied::Lost,
-            Some(view) if is_moved || view.canvas.is_wide() => {
-                let turned = if is_moved { self.last } else { DMat3::IDENTITY };
+            Some(view) if turned != DMat3::IDENTITY || view.canvas.is_wide() => {
                 // Through a lens, the first frame too may go on beyond its size.
                 let [own, needed] =
                     [DMat3::IDENTITY, turned].map(|turned| view.canvas.reach_px(&view.camera, &turned));

@@ -465,6 +465,60 @@ fn larger_pictures_show_what_the_camera_turned_to() {
     }
 }
 
+/// What a seeker finds in the frames of a camera that turns so far in each step.
+fn field_of(camera: &Camera, turns: impl Iterator<Item = [f64; 3]>) -> Option<FieldOfView> {
+    let mut seeker = FieldSeeker::default();
+    for (k, turn) in turns.enumerate() {
+        let left = 60.0 + 2.0 * k as f64;
+        let cover =
+            |at: DVec2| (left..left + 70.0).contains(&at.x).then(|| texture(9, at - DVec2::X * left, 5.0));
+        seeker.push(&Shot::of(camera, turn).drawn(|grey| grey, cover).as_frame()).unwrap();
+    }
+    seeker.found()
+}
+
+/// Fields of view from tele to wide, planted, while somebody covers a fifth of the picture and goes with the camera.
+#[test]
+fn a_pan_shows_the_field_of_view() {
+    for field_rad in [0.5f64, 0.8, 1.2, 1.55] {
+        let camera = Camera::level(SIZE, field_rad, 1.0, 5.0).unwrap();
+        let px = |k: i32| (1..=k).map(|k| f64::from(k.min(8))).sum::<f64>();
+        let turns = (0..26).map(|k| px(k) / camera.focal_px.x).map(|pan| [0.2 * pan, -pan, 0.05 * pan]);
+        let found = field_of(&camera, turns).unwrap_or_else(|| panic!("{field_rad}"));
+        let off = found.horizontal_rad - field_rad;
+        assert!(off.abs() < 2.0 * found.sd_rad, "{field_rad}: {found:?}");
+        assert!((0.003..0.02).contains(&(found.sd_rad / field_rad)), "{found:?}");
+    }
+}
+
+/// Shaking, a camera at rest and one that is carried along show no field of view, nor do pictures without texture.
+#[test]
+fn without_a_pan_no_field_of_view_is_found() {
+    let camera = camera();
+    assert_eq!(field_of(&camera, (0..20).map(|_| [0.0; 3])), None);
+    assert_eq!(
+        field_of(&camera, (0..20).map(f64::from).map(|k| [0.01 * k.sin(), 0.01 * (2.0 * k).cos(), 0.0])),
+        None
+    );
+    assert_eq!(field_of(&camera, std::iter::empty()), None);
+    let mut seeker = FieldSeeker::default();
+    for _ in 0..20 {
+        seeker.push(&Image::filled(320, 240, 90).as_frame()).unwrap();
+    }
+    assert_eq!(seeker.found(), None);
+    assert!(seeker.push(&Image::filled(320, 200, 90).as_frame()).is_err());
+    // A camera that is carried sideways along a wall moves all of the picture alike, as one with a very long lens would.
+    let mut seeker = FieldSeeker::default();
+    for k in 0..24 {
+        let pixels = (0..320 * 240)
+            .map(|n| texture(1, DVec2::new(f64::from(n % 320 + 6 * k), f64::from(n / 320)), 7.0));
+        let carried =
+            Image::from_vec(320, 240, pixels.map(|grey| grey.clamp(0.0, 255.0) as u8).collect()).unwrap();
+        seeker.push(&carried.as_frame()).unwrap();
+    }
+    assert_eq!(seeker.found(), None);
+}
+
 #[test]
 fn one_thread_and_many_give_the_same() {
     let camera = camera();

@@ -200,16 +200,14 @@ fn options_out_of_range_are_refused_by_name() {
 fn numbers_of_frames_are_those_of_the_frame_rate() {
     for (every_s, start_frames, path_frames) in [(0.04, 13, 40), (0.01, 43, 133)] {
         let given = TrackerOptions { start_frames: 13, path_frames: 40, ..options() };
-        let mut tracker = Tracker::new(given).unwrap();
+        let mut tracker = Tracker::new(given.clone()).unwrap();
         let frame = Image::filled(SIZE[0], SIZE[1], 100u8);
         for k in 0..20 {
             tracker.update(&frame.as_frame(), every_s * f64::from(k)).unwrap();
         }
-        assert_eq!(
-            (tracker.options().start_frames, tracker.options().path_frames),
-            (start_frames, path_frames)
-        );
+        assert_eq!((tracker.options.start_frames, tracker.options.path_frames), (start_frames, path_frames));
         assert_eq!(tracker.seek_report().start_frames, start_frames);
+        assert_eq!(tracker.options(), &given);
     }
 }
 
