@@ -629,6 +629,7 @@ def tracker_options(d):
         part_weights=lambda: d.choice(
             None, [1.0] * 14, [1e38] * 14, [0.0] * 13 + [1.0], [d.number(1, 9)] * 14
         ),
+        reach_px=lambda: [d.whole(0, 90) for _ in range(4)],
     )
 
 
@@ -674,13 +675,14 @@ def tracks(d, tracker):
     "Tracker.left_out",
     "Tracker.camera_motion",
     "Tracker.lost_views",
+    "Tracker.reach_px",
 )
 def _(d, name):
     tracker = new_tracker(d, _memo.Tracker)
     if name == "Tracker.__new__":
         return
     all(True for _ in tracks(d, tracker))
-    tracker.people(), tracker.seek_report(), tracker.camera_motion(), tracker.lost_views()
+    tracker.people(), tracker.seek_report(), tracker.camera_motion(), tracker.lost_views(), tracker.reach_px()
     tracker.finish()
     for left in tracker.left_out():
         (repr(left), left._repr_html_())
@@ -689,13 +691,31 @@ def _(d, name):
     tracker.finish() if d.is_wrong() else None
 
 
-@case("Steadier.__new__", "Steadier.update", "Steadier.losses")
+@case("Steadier.__new__", "Steadier.update", "Steadier.losses", "Steadier.reach_px")
 def _(d, name):
-    options = d.options(fov_deg=lambda: d.number(5, 170), still_px=lambda: d.number(0, 3))
+    options = d.options(
+        fov_deg=lambda: d.number(5, 170),
+        still_px=lambda: d.number(0, 3),
+        reach_px=lambda: [d.whole(0, 90) for _ in range(4)],
+    )
     steadier = _memo.Steadier(d.maybe(d.camera), **options)
     for frame in d.frames(d.size(7)):
         steadier.update(frame)
     steadier.losses()
+    assert min(steadier.reach_px()) >= 0
+
+
+@case("FieldSeeker.__new__", "FieldSeeker.update", "FieldSeeker.found")
+def _(d, name):
+    seeker = _memo.FieldSeeker()
+    for frame in d.frames(d.size(7)):
+        seeker.update(frame)
+    return seeker.found()
+
+
+@case("memo.field_of_view")
+def _(d):
+    return memo.field_of_view(d.frames(d.size(7)))
 
 
 @case("Walk.contours")

@@ -118,11 +118,33 @@ def test_the_command_reads_the_video_again(panned, track, tmp_path, memo_command
     options = ["--camera", camera, "--height", panned.scene.height_m, "--out", tmp_path / "run"]
     code, _, said = memo_command("track", video, *options)
     assert code == 0
-    assert "the camera pans: tracking once more, in larger pictures" in said
+    assert "the camera pans: tracking again, in larger pictures" in said
     run = json.loads((tmp_path / "run" / "run.json").read_text())
     assert max(run["options"]["reach_px"]) > 200 and run["camera"]["size"] == [WIDTH, len(panned.frames[0])]
     (why,) = explain(tmp_path / "run", [60])
     assert why.frame == 60 and why.luma.shape[1] > WIDTH + 200
+
+
+def test_the_pan_shows_the_field_of_view_of_an_assumed_camera(panned, track):
+    true_deg = 2 * np.degrees(np.arctan(WIDTH / 2 / panned.narrow[0, 0]))
+    # The camera stands still at first: what it shows then tells nothing.
+    found = memo.field_of_view(panned.frames)
+    assert abs(found.horizontal_deg - true_deg) < 2.5 * found.sd_deg < 1, (found, true_deg)
+    free = memo.track(panned.frames, fps=25, height_m=panned.scene.height_m)
+    assert len(free) > 0.9 * len(track)
+    (said,) = (sentence for sentence in free.sentences if "pan tells" in sentence)
+    assert f"shows {found.horizontal_deg:.1f}°" in said or abs(found.horizontal_deg - true_deg) < 0.5
+    speed = [np.ptp(one.columns["x_m"]) / np.ptp(one.columns["time_s"]) for one in (free, track)]
+    assert speed[0] == pytest.approx(speed[1], rel=0.05)
+    # A field of view that is given is not measured.
+    given = memo.track(panned.frames, fps=25, height_m=panned.scene.height_m, fov_deg=true_deg)
+    assert len(given) > 0.9 * len(track) and not any("pan tells" in sentence for sentence in given.sentences)
+
+
+def test_a_camera_at_rest_shows_no_field_of_view(panned):
+    assert memo.field_of_view([panned.frames[0]] * 12) is None
+    assert memo.field_of_view([]) is None
+    assert memo.field_of_view(list(panned.scene.frames)[:40]) is None
 
 
 def test_what_a_tracker_did_not_look_at_is_said_in_pixels_of_the_video():

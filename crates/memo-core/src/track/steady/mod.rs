@@ -305,8 +305,9 @@ pub struct Steadier {
     last_support: f64,
     /// Rotation from the frame before the last one to the last one.
     pace: Turned,
-    /// The coarsest scale of the last frame that a key frame explained.
+    /// The coarsest scale of the last frame that a key frame explained, and of a camera that moves the whole frame.
     last_coarse: Option<Image<u8>>,
+    last_frame: Option<Image<u8>>,
     other: Option<Other>,
     /// Frames since the last one that a key frame explained, and frames of little support.
     unexplained: usize,
@@ -336,6 +337,7 @@ impl Steadier {
             last_support: 0.0,
             pace: DMat3::IDENTITY,
             last_coarse: None,
+            last_frame: None,
             other: None,
             unexplained: 0,
             fading: 0,
@@ -380,7 +382,7 @@ impl Steadier {
             self.note(number, found, support);
             return Ok(());
         }
-        let (found, support) = match self.compared(&pyramid) {
+        let (found, support) = match self.compared(&pyramid).or_else(|| self.compared_with_last(&pyramid)) {
             Some((key, estimate)) => {
                 self.follow(number, key, &estimate, &pyramid);
                 (CameraState::Turned, estimate.support)
@@ -471,6 +473,7 @@ impl Steadier {
         self.keys = vec![key];
         (self.last, self.pace) = (DMat3::IDENTITY, DMat3::IDENTITY);
         self.last_support = 0.0;
+        self.last_frame = None;
         self.other = None;
         (self.unexplained, self.fading, self.zooming) = (0, 0, 0);
         self.is_lost = false;
@@ -520,6 +523,31 @@ impl Steadier {
         still.map(|still| (0, still)).or(found)
     }
 
+    /// The estimate against the last frame of a camera that moves, which becomes a key frame, when no key frame explains this one.
+    fn compared_with_last(&mut self, pyramid: &Pyramid<'_>) -> Option<(usize, Estimate)> {
+        if self.unexplained > 0 || self.is_lost {
+            return None;
+        }
+        let (camera, last) = (&self.view.as_ref()?.camera, self.last_frame.as_ref()?.as_frame());
+        let template = Template::new(&Pyramid::new(last, levels(&last)), camera).ok()?;
+        let comparison = Comparison { pyramid, camera };
+        let near = [DMat3::IDENTITY, self.pace].map(|from| comparison.near(&template, &from, 1.0));
+        let found = near.into_iter().flatten().max_by(|a, b| a.support.total_cmp(&b.support))?;
+        if !found.is_supported(JUMP_SUPPORT) {
+            return None;
+        }
+        let zoom = self.keys[self.nearest_key()].zoom;
+        self.add_key(Key { template, turned: self.last, zoom });
+        Some((self.keys.len() - 1, found))
+    }
+
+    fn add_key(&mut self, key: Key) {
+        if self.keys.len() >= MOST_KEYS {
+            self.keys.remove(1);
+        }
+        self.keys.push(key);
+    }
+
     /// The key frame that looks nearest to where the camera last looked.
     fn nearest_key(&self) -> usize {
         let angle = |key: &Key| vector(&(self.last * key.turned.transpose())).length();
@@ -539,6 +567,8 @@ impl Steadier {
         self.unexplained = 0;
         self.fading = if estimate.support < KEY_SUPPORT { self.fading + 1 } else { 0 };
         self.last_coarse = Some(pyramid.coarsest().to_image());
+        let is_moving = displacement_px(&view.camera, &self.pace)[0] > PACE_PX;
+        self.last_frame = is_moving.then(|| pyramid.level(0).to_image());
         self.other = None;
         let zoom = self.keys[key].zoom + estimate.zoom[0];
         let corner_px =
@@ -559,10 +589,7 @@ impl Steadier {
         if shared < KEY_OVERLAP || self.fading >= FADING_FRAMES {
             self.fading = 0;
             let Ok(template) = Template::new(pyramid, &view.camera) else { return };
-            if self.keys.len() >= MOST_KEYS {
-                self.keys.remove(1);
-            }
-            self.keys.push(Key { template, turned: self.last, zoom });
+            self.add_key(Key { template, turned: self.last, zoom });
         }
     }
 
