@@ -1,7 +1,6 @@
-"""A camera that pans after a walker: drawn people before a textured wall, seen by a camera that turns in the same place."""
+"""A camera that turns in its place after a walker: drawn people before a textured wall."""
 
 import json
-from types import SimpleNamespace
 
 import cv2
 import memo
@@ -10,49 +9,12 @@ import pytest
 from conftest import grey_video
 from memo.camera_motion import CameraMotion
 from memo.explain import explain
-
-WIDTH = 360
-
-
-def textured(frames):
-    """The same frames with a texture on all that does not move."""
-    frames = np.asarray(frames, float)
-    wall = np.random.default_rng(3).uniform(-1, 1, frames[0].shape).astype(np.float32)
-    wall = cv2.GaussianBlur(wall, None, 2.0)
-    empty = np.median(frames, axis=0)
-    for frame in frames:
-        moves = cv2.medianBlur((np.abs(frame - empty) > 14).astype(np.uint8), 5)
-        still = cv2.dilate(moves, np.ones((5, 5))) == 0
-        yield np.clip(frame + still * 18 / wall.std() * wall, 0, 255).astype(np.uint8)
+from panned import WIDTH, panned_scene
 
 
 @pytest.fixture(scope="module", params=[0, 1])
 def panned(request):
-    """A scene, and its frames through a narrow camera that turns after the walker, with the camera of the first one."""
-    scene = memo.demo_scene(request.param)
-    given, truth = scene.camera.parameters(), scene.truth
-    matrix, height = np.array(given["matrix"]), scene.frames[0].shape[0]
-    from_world, shift = cv2.Rodrigues(np.array(given["rotation"]))[0], np.array(given["translation"])
-    narrow = matrix.copy()
-    narrow[0, 2] = (WIDTH - 1) / 2
-    torsos = np.stack([truth[f"{axis}_m"] for axis in "xyz"], axis=1) @ from_world.T + shift
-    aside = np.arctan2(torsos[:, 0], torsos[:, 2])
-    # As far as the wide picture goes.
-    most = np.arctan(matrix[0, 2] / matrix[0, 0]) - np.arctan(WIDTH / 2 / matrix[0, 0])
-    turns_rad = np.clip(np.interp(np.arange(len(scene.frames)), truth["frame"], aside), -most, most)
-    turned = [cv2.Rodrigues(np.array([0, -turn_rad, 0]))[0] for turn_rad in turns_rad]
-    frames = [
-        cv2.warpPerspective(frame, narrow @ turn @ np.linalg.inv(matrix), (WIDTH, height), flags=cv2.INTER_CUBIC)
-        for frame, turn in zip(textured(scene.frames), turned, strict=True)
-    ]
-    first = {
-        "size": [WIDTH, height],
-        "matrix": narrow.tolist(),
-        "rotation": cv2.Rodrigues(turned[0] @ from_world)[0].ravel().tolist(),
-        "translation": (turned[0] @ shift).tolist(),
-    }
-    camera = memo.Camera.from_parameters({**given, **first})
-    return SimpleNamespace(scene=scene, frames=frames, camera=camera, turned=turned, narrow=narrow)
+    return panned_scene(request.param)
 
 
 @pytest.fixture(scope="module")
@@ -79,7 +41,7 @@ def test_a_walker_is_followed_beyond_the_first_view(panned, track):
         frame = columns["frame"][row]
         turn = panned.turned[frame] @ cv2.Rodrigues(np.array(given["rotation"]))[0]
         at = np.array([columns[f"right_hip_{axis}_m"][row] for axis in "xyz"])
-        seen = panned.narrow @ (turn @ at + panned.turned[frame] @ np.array(given["translation"]))
+        seen = panned.matrix @ (turn @ at + panned.turned[frame] @ np.array(given["translation"]))
         told = [columns[f"right_hip_{axis}_px"][row] for axis in "uv"]
         assert np.hypot(*(seen[:2] / seen[2] - told)) < 1.5, frame
     assert track.camera_motion.wider_px is None
@@ -126,7 +88,7 @@ def test_the_command_reads_the_video_again(panned, track, tmp_path, memo_command
 
 
 def test_the_pan_shows_the_field_of_view_of_an_assumed_camera(panned, track):
-    true_deg = 2 * np.degrees(np.arctan(WIDTH / 2 / panned.narrow[0, 0]))
+    true_deg = panned.field_of_view_deg
     # The camera stands still at first: what it shows then tells nothing.
     found = memo.field_of_view(panned.frames)
     assert abs(found.horizontal_deg - true_deg) < 2.5 * found.sd_deg < 1, (found, true_deg)

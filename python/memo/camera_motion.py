@@ -134,8 +134,8 @@ class CameraMotion:
         if (wider_px := self.wider_px) is not None:
             left, top, right, bottom = (side * self.shrink for side in wider_px)
             said.append(
-                f"The camera pans: it shows {left} px to the left of the first frame, {top} above it, {right} "
-                f"to the right and {bottom} below. Who was there was not followed: give reach_px="
+                f"The camera pans: it shows {left} px to the left of the first frame, {top} above it, "
+                f"{right} to the right and {bottom} below. Who was there was not followed: give reach_px="
                 f"{wider_px}, or frames that can be read twice."
             )
         if self.is_unexplained:

@@ -1,4 +1,4 @@
-"""A camera that pans: its field of view, and what a first track tells of how its frames must be tracked again."""
+"""A camera that pans: its field of view, and how its frames must be tracked again."""
 
 from __future__ import annotations
 
@@ -18,11 +18,12 @@ __all__ = ["again", "field_of_view"]
 def field_of_view(frames: Iterable[npt.NDArray[np.uint8]]) -> FieldOfView | None:
     """Measures the horizontal field of view of a camera that pans.
 
-    `frames` are (H, W) uint8, from when the camera begins to turn; after 500 frames, or when the middle of
-    the picture has moved by two fifths of its longer side, no more are read. The camera turns in its place,
-    by at least a sixth of the picture, before a background with texture. Returns None if it does not, or if no
-    field of view explains the frames better than others. Pixels are taken to be square, and the lens to bend
-    no straight lines. `memo.track` and `memo.Tracker` take the result as `fov_deg`.
+    `frames` are (H, W) uint8, from when the camera begins to turn; after 500 frames, or when the middle
+    of the picture has moved by two fifths of its longer side, no more are read. The camera turns in its
+    place, by at least a sixth of the picture, before a background with texture. Returns None if it does
+    not, or if no field of view explains the frames better than others. Pixels are taken to be square,
+    and the lens to bend no straight lines. `memo.track` and `memo.Tracker` take the result as
+    `fov_deg`.
     """
     seeker = _memo.FieldSeeker()
     for frame in frames:

@@ -224,7 +224,7 @@ def track(
         raise ValueError("give either times_s or fps")
     if fps is not None and not (np.isfinite(fps) and fps > 0):
         raise ValueError(f"fps must be a positive number, got {fps}")
-    options = {"camera": camera, "fov_deg": fov_deg, "reach_px": reach_px}
+    options: dict[str, Any] = {"camera": camera, "fov_deg": fov_deg, "reach_px": reach_px}
     is_read_once = any(given is not None and iter(given) is given for given in (frames, times_s, boxes))
     while True:
         tracker = Tracker(

@@ -303,6 +303,8 @@ pub struct Steadier {
     keys: Vec<Key>,
     last: Turned,
     last_support: f64,
+    /// Its relative change of the focal length against the first frame.
+    zoom: f64,
     /// Rotation from the frame before the last one to the last one.
     pace: Turned,
     /// The coarsest scale of the last frame that a key frame explained, and of a camera that moves the whole frame.
@@ -335,6 +337,7 @@ impl Steadier {
             keys: Vec::new(),
             last: DMat3::IDENTITY,
             last_support: 0.0,
+            zoom: 0.0,
             pace: DMat3::IDENTITY,
             last_coarse: None,
             last_frame: None,
@@ -472,7 +475,7 @@ impl Steadier {
         self.view = Some(view);
         self.keys = vec![key];
         (self.last, self.pace) = (DMat3::IDENTITY, DMat3::IDENTITY);
-        self.last_support = 0.0;
+        (self.last_support, self.zoom) = (0.0, 0.0);
         self.last_frame = None;
         self.other = None;
         (self.unexplained, self.fading, self.zooming) = (0, 0, 0);
@@ -536,8 +539,7 @@ impl Steadier {
         if !found.is_supported(JUMP_SUPPORT) {
             return None;
         }
-        let zoom = self.keys[self.nearest_key()].zoom;
-        self.add_key(Key { template, turned: self.last, zoom });
+        self.add_key(Key { template, turned: self.last, zoom: self.zoom });
         Some((self.keys.len() - 1, found))
     }
 
@@ -571,6 +573,7 @@ impl Steadier {
         self.last_frame = is_moving.then(|| pyramid.level(0).to_image());
         self.other = None;
         let zoom = self.keys[key].zoom + estimate.zoom[0];
+        self.zoom = zoom;
         let corner_px =
             0.5 * DVec2::new(f64::from(view.camera.size[0]), f64::from(view.camera.size[1])).length();
         let is_zoomed =
