@@ -31,7 +31,9 @@ def scored(panned: Panned, **given) -> list[float]:
     if not len(rows):
         return [0.0, *[float("nan")] * 5]
     off = {name: columns[name][own] - truth[name][rows] for name in ("x_m", "y_m", "z_m")}
-    rms = [100 * float(np.sqrt(np.mean(off[f"{axis}_m"] ** 2))) for axis in "xyz"]
+    # The world of an assumed camera is another one.
+    scale = 100 if "camera" in given else float("nan")
+    rms = [scale * float(np.sqrt(np.mean(off[f"{axis}_m"] ** 2))) for axis in "xyz"]
     for joint in ("hip", "knee"):
         both = [
             columns[f"{side}_{joint}_deg"][own] - truth[f"{side}_{joint}_deg"][rows]
@@ -39,6 +41,12 @@ def scored(panned: Panned, **given) -> list[float]:
         ]
         rms.append(float(np.sqrt(np.nanmean(np.square(both)))))
     return [len(np.unique(rows)) / len(truth["frame"]), *rms]
+
+
+def _told(values, worst) -> str:
+    """The median and the worst of what was measured."""
+    known = values[np.isfinite(values)]
+    return f"{np.median(known):.2f} ({worst(known):.2f})" if len(known) else "-"
 
 
 def main() -> None:
@@ -67,9 +75,8 @@ def main() -> None:
         if found is not None:
             fields.append([found.horizontal_deg - panned.field_of_view_deg, found.sd_deg])
     for way, figures in ways.items():
-        middle, worst = np.nanmedian(figures, axis=0), np.nanmax(figures, axis=0)
-        worst[0] = np.min(figures, axis=0)[0]
-        said = (f"{a:.2f} ({b:.2f})" for a, b in zip(middle, worst, strict=True))
+        of_each = dict(zip(FIGURES, np.array(figures).T, strict=True))
+        said = (_told(values, min if name == "cover" else max) for name, values in of_each.items())
         print(f"{'median':>6}  {way:>10}  " + "  ".join(said))
     off, sd = np.array(fields).T
     print(
