@@ -630,6 +630,7 @@ def tracker_options(d):
             None, [1.0] * 14, [1e38] * 14, [0.0] * 13 + [1.0], [d.number(1, 9)] * 14
         ),
         reach_px=lambda: [d.whole(0, 90) for _ in range(4)],
+        reach_from_rad=lambda: [d.number(-1, 1) for _ in range(3)],
     )
 
 
@@ -675,14 +676,14 @@ def tracks(d, tracker):
     "Tracker.left_out",
     "Tracker.camera_motion",
     "Tracker.lost_views",
-    "Tracker.reach_px",
+    "Tracker.wider",
 )
 def _(d, name):
     tracker = new_tracker(d, _memo.Tracker)
     if name == "Tracker.__new__":
         return
     all(True for _ in tracks(d, tracker))
-    tracker.people(), tracker.seek_report(), tracker.camera_motion(), tracker.lost_views(), tracker.reach_px()
+    tracker.people(), tracker.seek_report(), tracker.camera_motion(), tracker.lost_views(), tracker.wider()
     tracker.finish()
     for left in tracker.left_out():
         (repr(left), left._repr_html_())
@@ -691,18 +692,19 @@ def _(d, name):
     tracker.finish() if d.is_wrong() else None
 
 
-@case("Steadier.__new__", "Steadier.update", "Steadier.losses", "Steadier.reach_px")
+@case("Steadier.__new__", "Steadier.update", "Steadier.losses", "Steadier.wider")
 def _(d, name):
     options = d.options(
         fov_deg=lambda: d.number(5, 170),
         still_px=lambda: d.number(0, 3),
         reach_px=lambda: [d.whole(0, 90) for _ in range(4)],
+        reach_from_rad=lambda: [d.number(-1, 1) for _ in range(3)],
     )
     steadier = _memo.Steadier(d.maybe(d.camera), **options)
     for frame in d.frames(d.size(7)):
         steadier.update(frame)
     steadier.losses()
-    assert min(steadier.reach_px()) >= 0
+    steadier.wider()
 
 
 @case("FieldSeeker.__new__", "FieldSeeker.update", "FieldSeeker.found")

@@ -53,11 +53,9 @@ class CameraMotion:
     """Pixels of the video per pixel of a frame, along each axis."""
     camera_given: bool = False
     """Whether a calibration was given."""
-    shown_px: tuple[int, int, int, int] = (0, 0, 0, 0)
-    """How far the frames of a camera that pans go on beyond the first one, in pixels as given to the tracker:
-    left, top, right and bottom; 0 of one that does not."""
-    reach_px: tuple[int, int, int, int] = (0, 0, 0, 0)
-    """How far the tracker looked there."""
+    wider: Mapping[str, Any] | None = None
+    """Of a camera that pans, the options of `Tracker` with which it sees all of the frames (`reach_px` and
+    `reach_from_rad`); None if it did."""
     field_of_view: FieldOfView | None = None
     """The field of view of a camera that is not calibrated, if it was measured in a pan."""
 
@@ -80,14 +78,6 @@ class CameraMotion:
     def moved(self) -> bool:
         """True if frames were steadied or a view ended."""
         return bool(self.lost) or any(row.state == "turned" for row in self.rows)
-
-    @property
-    def wider_px(self) -> tuple[int, int, int, int] | None:
-        """The `reach_px` with which a tracker sees all of a camera that pans; None if this one did."""
-        if all(shown <= reach for shown, reach in zip(self.shown_px, self.reach_px, strict=True)):
-            return None
-        left, top, right, bottom = map(max, self.shown_px, self.reach_px)
-        return left, top, right, bottom
 
     @property
     def is_unexplained(self) -> bool:
@@ -131,12 +121,12 @@ class CameraMotion:
                 f"The picture shows {self.field_of_view.horizontal_deg:.1f}° from left to right (standard "
                 f"deviation {self.field_of_view.sd_deg:.1f}°), as the camera's pan tells."
             )
-        if (wider_px := self.wider_px) is not None:
-            left, top, right, bottom = (side * self.shrink for side in wider_px)
+        if self.wider is not None:
             said.append(
-                f"The camera pans: it shows {left} px to the left of the first frame, {top} above it, "
-                f"{right} to the right and {bottom} below. Who was there was not followed: give reach_px="
-                f"{wider_px}, or frames that can be read twice."
+                "The camera pans, and who was beyond its first view was not followed. With frames that can "
+                "be read twice, memo finds out how far; otherwise give "
+                + " and ".join(f"{name}={list(value)}" for name, value in self.wider.items())
+                + "."
             )
         if self.is_unexplained:
             said.append(

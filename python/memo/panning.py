@@ -46,11 +46,9 @@ def again(
     if not motion.moved:
         return {}
     is_assumed = options.get("camera") is None and options.get("fov_deg") is None
-    if is_assumed and (motion.is_unexplained or motion.wider_px is not None):
+    if is_assumed and (motion.is_unexplained or motion.wider is not None):
         turned = next((k for k, row in enumerate(motion.rows) if row.state != "still"), 0)
         measured = field_of_view(islice(frames(), max(turned - 1, 0), None))
         if measured is not None:
             return {"fov_deg": measured}
-    if options.get("reach_px") is None and motion.wider_px is not None:
-        return {"reach_px": motion.wider_px}
-    return {}
+    return {} if options.get("reach_px") is not None else dict(motion.wider or {})

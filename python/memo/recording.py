@@ -225,7 +225,7 @@ def _track_recording(
             changes = again(recorded.camera_motion, options, lumas)
             if not changes:
                 break
-            remark(f"{video}: the camera pans: tracking again, {_AGAIN[min(changes)]}")
+            remark(f"{video}: the camera pans: tracking again, {_AGAIN[max(changes)]}")
             options |= changes
             with opened() as once_more:
                 tracker, count = memo.Tracker(**options), once_more.frame_count

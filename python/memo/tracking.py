@@ -74,9 +74,10 @@ class Tracker:
     `full_gradient`, `full_velocity`: edges of smaller gradient (grey levels per pixel) or image speed (pixels
     per frame) are weighted in proportion, w_G and w_V of eq. 11; None weights all equally.
     `part_weights`: w_K, 14 numbers in the order of `Track.contour_parts`.
-    `reach_px`: how far pictures of a camera that pans go on beyond the first frame: left, top, right and
-    bottom, pixels. People there are followed. What a video needs is `CameraMotion.wider_px` of a first
-    `Track`; None is 0.
+    `reach_px`: how far the pictures in which people are followed go on beyond a frame, for a camera that
+    pans: left, top, right and bottom, pixels; 0 by default. `reach_from_rad`: the rotation vector from the
+    first frame's camera to the one of these pictures. What a video needs is `CameraMotion.wider` of a
+    first `Track`.
 
     Defaults: `fov_deg` 62, `gait` "dense", `start_frames` 13, `measure` "rohr".
     """
@@ -98,7 +99,8 @@ class Tracker:
         full_gradient: float | None = None,
         full_velocity: float | None = None,
         part_weights: Sequence[float] | None = None,
-        reach_px: tuple[int, int, int, int] | None = None,
+        reach_px: Sequence[int] | None = None,
+        reach_from_rad: Sequence[float] | None = None,
     ) -> None:
         self._field_of_view = fov_deg if isinstance(fov_deg, FieldOfView) else None
         if isinstance(fov_deg, FieldOfView):
@@ -118,6 +120,7 @@ class Tracker:
             "full_velocity": full_velocity,
             "part_weights": part_weights,
             "reach_px": reach_px,
+            "reach_from_rad": reach_from_rad,
         }
         """All options but the camera; a run's record has them as they were, whatever the defaults become."""
         usual = _memo.defaults("track")
@@ -158,12 +161,12 @@ class Tracker:
         """Ends the stream and returns all walks not returned before."""
         self._core.finish()
         self._walks += self._core.take_finished()
+        wider = self._core.wider()
         motion = CameraMotion(
             self._core.camera_motion(),
             self._core.lost_views(),
             camera_given=self._camera is not None,
-            shown_px=self._core.reach_px(),
-            reach_px=self.options["reach_px"] or (0, 0, 0, 0),
+            wider=None if wider is None else dict(zip(("reach_px", "reach_from_rad"), wider, strict=True)),
             field_of_view=self._field_of_view,
         )
         found = Track(
@@ -206,7 +209,8 @@ def track(
     full_gradient: float | None = None,
     full_velocity: float | None = None,
     part_weights: Sequence[float] | None = None,
-    reach_px: tuple[int, int, int, int] | None = None,
+    reach_px: Sequence[int] | None = None,
+    reach_from_rad: Sequence[float] | None = None,
 ) -> Track:
     """Tracks everybody who walks through frames, (H, W) uint8 each, given `times_s` or `fps`.
 
@@ -224,7 +228,8 @@ def track(
         raise ValueError("give either times_s or fps")
     if fps is not None and not (np.isfinite(fps) and fps > 0):
         raise ValueError(f"fps must be a positive number, got {fps}")
-    options: dict[str, Any] = {"camera": camera, "fov_deg": fov_deg, "reach_px": reach_px}
+    options: dict[str, Any] = {"camera": camera, "fov_deg": fov_deg}
+    options |= {"reach_px": reach_px, "reach_from_rad": reach_from_rad}
     is_read_once = any(given is not None and iter(given) is given for given in (frames, times_s, boxes))
     while True:
         tracker = Tracker(

@@ -7,7 +7,7 @@ use crate::result::{objects, result};
 use crate::wait::pooled;
 use crate::whole::{Whole, WholeNumbers};
 use memo_core::OptionError;
-use memo_core::track::steady::{CameraMotion, FieldSeeker, Loss, Steadied, Steadier, SteadyOptions};
+use memo_core::track::steady::{CameraMotion, FieldSeeker, Loss, Reach, Steadied, Steadier, SteadyOptions};
 use numpy::PyArray2;
 use pyo3::prelude::*;
 
@@ -60,8 +60,18 @@ result! {
     |own| own.motion.get().__repr__()
 }
 
-/// What `reach_px` may be.
-pub const REACH: &str = "four whole numbers from 0 to 5000";
+/// `reach_px` and `reach_from_rad`.
+pub type Wider = ([u32; 4], [f64; 3]);
+
+pub fn wider_of(reach: Reach) -> Wider {
+    (reach.px, reach.turn_rad.to_array())
+}
+
+/// How far pictures go on beyond frames, of these arguments.
+pub fn reach(reach_px: Option<Whole<[u32; 4]>>, reach_from_rad: Option<[f64; 3]>) -> PyResult<Reach> {
+    let px = reach_px.must_be("reach_px", "four whole numbers from 0 to 5000")?.unwrap_or_default();
+    Ok(Reach { turn_rad: reach_from_rad.unwrap_or_default().into(), px })
+}
 
 /// Steadies a stream of frames, as `Tracker` does before it compares them.
 #[pyclass(name = "Steadier", module = "memo._memo")]
@@ -71,12 +81,13 @@ pub struct PySteadier(Steadier);
 impl PySteadier {
     /// Without a camera, one of the field of view `fov_deg` is assumed.
     #[new]
-    #[pyo3(signature = (camera=None, *, fov_deg=None, still_px=None, reach_px=None))]
+    #[pyo3(signature = (camera=None, *, fov_deg=None, still_px=None, reach_px=None, reach_from_rad=None))]
     fn new(
         camera: Option<PyCamera>,
         fov_deg: Option<f64>,
         still_px: Option<f64>,
         reach_px: Option<Whole<[u32; 4]>>,
+        reach_from_rad: Option<[f64; 3]>,
     ) -> PyResult<Self> {
         if let Some(got) = fov_deg.filter(|fov_deg| !(5.0..=170.0).contains(fov_deg)) {
             let wanted = "between 5 and 170 degrees";
@@ -84,7 +95,7 @@ impl PySteadier {
         }
         let mut options = SteadyOptions::default();
         options.still_px = still_px.unwrap_or(options.still_px);
-        options.reach_px = reach_px.must_be("reach_px", REACH)?.unwrap_or_default();
+        options.reach = reach(reach_px, reach_from_rad)?;
         options.check().map_err(value_error)?;
         Ok(Self(Steadier::new(options, camera.map(|c| c.0).as_ref(), fov_deg.map(f64::to_radians))))
     }
@@ -99,9 +110,9 @@ impl PySteadier {
         SteadiedFrame::of(py, motion, steadied)
     }
 
-    /// How far the frames of a camera that pans go on beyond the first one, pixels: left, top, right, bottom.
-    fn reach_px(&self) -> [u32; 4] {
-        self.0.reach_px()
+    /// Of a camera that pans, the `reach_px` and `reach_from_rad` with which pictures show all of the frames; None if these did.
+    fn wider(&self) -> Option<Wider> {
+        self.0.wider().map(wider_of)
     }
 
     /// The views that have ended.

@@ -5,7 +5,7 @@ use crate::camera::PyCamera;
 use crate::defaults::dict;
 use crate::error::{value_error, wrong_type};
 use crate::result::{objects, result};
-use crate::steady::{FrameMotion, LostView, REACH};
+use crate::steady::{FrameMotion, LostView, Wider, reach, wider_of};
 use crate::wait::{LOOK, watched};
 use crate::walk::Walk;
 use crate::whole::{Whole, WholeNumbers};
@@ -225,7 +225,7 @@ impl PyTracker {
     #[pyo3(signature = (
         height_m=None, camera=None, *, fov_deg=None, gait=None, adapt=true, start_frames=None, treadmill=None,
         compensate_gain=false, background=false, steady=true, measure=None, full_gradient=None, full_velocity=None,
-        part_weights=None, reach_px=None
+        part_weights=None, reach_px=None, reach_from_rad=None
     ))]
     #[allow(clippy::too_many_arguments, reason = "keyword arguments in Python")]
     fn new(
@@ -244,6 +244,7 @@ impl PyTracker {
         full_velocity: Option<f32>,
         part_weights: Option<[f32; 14]>,
         reach_px: Option<Whole<[u32; 4]>>,
+        reach_from_rad: Option<[f64; 3]>,
     ) -> PyResult<Self> {
         let mut options = TrackerOptions::default();
         match height_m {
@@ -265,8 +266,8 @@ impl PyTracker {
         }
         options.evidence.change.compensate_gain = compensate_gain;
         options.evidence.background = background.then(BackgroundOptions::default);
-        let reach_px = reach_px.must_be("reach_px", REACH)?.unwrap_or_default();
-        options.steady = steady.then(|| SteadyOptions { reach_px, ..SteadyOptions::default() });
+        let reach = reach(reach_px, reach_from_rad)?;
+        options.steady = steady.then(|| SteadyOptions { reach, ..SteadyOptions::default() });
         options.evidence.flow = full_velocity.map(|_| FlowOptions::default());
         let similarity = &mut options.walk.similarity;
         if let Some(measure) = measure {
@@ -327,9 +328,9 @@ impl PyTracker {
         objects(py, motions.iter().map(|motion| FrameMotion::of(py, motion)))
     }
 
-    /// How far the frames of a camera that pans go on beyond the first one, pixels: left, top, right, bottom.
-    fn reach_px(&self, py: Python<'_>) -> PyResult<[u32; 4]> {
-        self.read(py, |tracker| tracker.reach_px())
+    /// Of a camera that pans, the `reach_px` and `reach_from_rad` with which a tracker sees all of the frames; None if this one did.
+    fn wider(&self, py: Python<'_>) -> PyResult<Option<Wider>> {
+        Ok(self.read(py, |tracker| tracker.wider())?.map(wider_of))
     }
 
     /// Where a view of the camera ended.

@@ -7,7 +7,7 @@
 //! have the brightness before ([`SteadyLight`]).
 
 use super::score::EdgeLine;
-use super::steady::{CameraMotion, Loss, Steadied, Steadier};
+use super::steady::{CameraMotion, Loss, Reach, Steadied, Steadier};
 use crate::OptionError;
 use crate::calibrate::tilt::camera_tilt;
 use crate::calibrate::{TiltError, TiltEstimate};
@@ -313,9 +313,9 @@ impl EvidenceStream {
         moved(r, size, |pixel| steadier.in_frame(frame, pixel))
     }
 
-    /// How far the frames of a camera that pans go on beyond the first one, pixels: left, top, right and bottom.
-    pub fn reach_px(&self) -> [u32; 4] {
-        self.steadier.as_ref().map_or([0; 4], Steadier::reach_px)
+    /// How far the steadied pictures of a camera that pans should go on beyond the frames; `None` if they do.
+    pub fn wider(&self) -> Option<Reach> {
+        self.steadier.as_ref().and_then(Steadier::wider)
     }
 
     /// The views that have ended.

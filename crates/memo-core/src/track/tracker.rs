@@ -45,7 +45,7 @@ pub use super::people::Now;
 use super::rate::{FrameRate, lasting};
 use super::result::TrackedWalk;
 use super::standing::Standing;
-use super::steady::{CameraMotion, Loss};
+use super::steady::{CameraMotion, Loss, Reach};
 
 use super::walk::FrameEdges;
 use crate::OptionError;
@@ -323,10 +323,10 @@ impl Tracker {
         left_out
     }
 
-    /// How far the frames of a camera that pans go on beyond the first one, pixels: left, top, right and bottom. People there
-    /// are followed if [`SteadyOptions::reach_px`](super::steady::SteadyOptions::reach_px) is as large.
-    pub fn reach_px(&self) -> [u32; 4] {
-        self.stream.reach_px()
+    /// How far the steadied pictures of a camera that pans should go on beyond the frames, for people to be followed there; `None` if
+    /// they do. Another tracker with it as [`SteadyOptions::reach`](super::steady::SteadyOptions::reach) sees all of them.
+    pub fn wider(&self) -> Option<Reach> {
+        self.stream.wider()
     }
 
     /// What was found of the camera in the latest frames.

@@ -81,15 +81,23 @@ pub struct SteadyOptions {
     /// Relative change of the focal length, as displacement of the corners in pixels, from which the picture is taken for
     /// zoomed. Default 3.
     pub most_zoom_px: f64,
-    /// How far the steadied pictures go on beyond the first frame, pixels: left, top, right and bottom. Default 0: what a camera
-    /// shows that has turned farther is cut off. [`Steadier::reach_px`] says how much a video needs. Without a given camera it
-    /// is the larger one of both sides.
-    pub reach_px: [u32; 4],
+    /// The size of the steadied pictures. Default: that of a frame, so what a camera shows that has turned farther is cut off.
+    pub reach: Reach,
+}
+
+/// How far steadied pictures go on beyond a frame. [`Steadier::wider`] says how far they should.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Reach {
+    /// Rotation vector from the first frame's camera to that of the pictures, radians, camera axes: to the middle of a pan.
+    pub turn_rad: DVec3,
+    /// How far the pictures go on beyond a frame of that camera, pixels: left, top, right and bottom. Without a given camera it is the
+    /// larger one of both sides.
+    pub px: [u32; 4],
 }
 
 impl Default for SteadyOptions {
     fn default() -> Self {
-        Self { still_px: 0.3, least_support: 0.35, most_zoom_px: 3.0, reach_px: [0; 4] }
+        Self { still_px: 0.3, least_support: 0.35, most_zoom_px: 3.0, reach: Reach::default() }
     }
 }
 
@@ -100,16 +108,35 @@ impl SteadyOptions {
         let is_share = self.least_support > 0.0 && self.least_support < 1.0;
         OptionError::unless(is_share, "least_support", "between 0 and 1", self.least_support)?;
         OptionError::unless_positive("most_zoom_px", self.most_zoom_px)?;
-        let farthest = self.reach_px.into_iter().max().unwrap_or(0);
+        let farthest = self.reach.px.into_iter().max().unwrap_or(0);
+        let turn_rad = self.reach.turn_rad.length();
+        OptionError::unless(
+            turn_rad <= MOST_TURN_RAD,
+            "reach_from_rad",
+            "of a turn of at most 2 rad",
+            turn_rad,
+        )?;
         let is_possible = farthest <= MOST_REACH_PX;
         OptionError::unless(is_possible, "reach_px", "at most 5000 pixels", f64::from(farthest))
     }
+}
+
+impl Reach {
+    /// True if the pictures are larger than the frames.
+    pub(crate) fn is_wide(&self) -> bool {
+        *self != Self::default()
+    }
 
     /// The reach about an image of a camera that is given or assumed.
-    pub(crate) fn reach_about(&self, is_given: bool) -> [u32; 4] {
-        let [left, top, right, bottom] = self.reach_px;
+    pub(crate) fn about(self, is_given: bool) -> Self {
+        let [left, top, right, bottom] = self.px;
         let (aside, up) = (left.max(right), top.max(bottom));
-        if is_given { self.reach_px } else { [aside, up, aside, up] }
+        if is_given { self } else { Self { px: [aside, up, aside, up], ..self } }
+    }
+
+    /// The camera of the pictures.
+    pub(crate) fn camera(&self, first: &Camera) -> Camera {
+        if self.is_wide() { first.turned(self.turn_rad).widened(self.px) } else { first.clone() }
     }
 }
 
@@ -258,7 +285,8 @@ const MOST_LOSSES: usize = 100;
 const PACE_PX: f64 = 0.5;
 /// A camera pans if it shows more than this share of a frame's side beyond the first frame. One that shakes shows less.
 const PAN_SHARE: f64 = 0.05;
-/// The largest [`SteadyOptions::reach_px`].
+/// The largest [`Reach`].
+const MOST_TURN_RAD: f64 = 2.0;
 const MOST_REACH_PX: u32 = 5_000;
 /// The coarsest level has about this many pixels along its shorter side.
 const COARSEST_PX: usize = 100;
@@ -320,8 +348,7 @@ pub struct Steadier {
     motions: VecDeque<CameraMotion>,
     losses: Vec<Loss>,
     news: Option<Loss>,
-    /// How far the frames go on beyond the first one, and whether that is more than shaking.
-    reach_px: [u32; 4],
+    /// Whether frames go on beyond the first one by more than shaking.
     pans: bool,
 }
 
@@ -350,7 +377,6 @@ impl Steadier {
             motions: VecDeque::new(),
             losses: Vec::new(),
             news: None,
-            reach_px: [0; 4],
             pans: false,
         }
     }
@@ -428,10 +454,21 @@ impl Steadier {
         if is_as_given { None } else { at(view, &motion.turned()) }
     }
 
-    /// How far the frames so far go on beyond the first one if the camera pans, pixels: left, top, right and bottom; 0 if it does
-    /// not. A camera that has turned by more than 55 degrees shows parts that are not counted.
-    pub fn reach_px(&self) -> [u32; 4] {
-        if self.pans { self.reach_px } else { [0; 4] }
+    /// How far the steadied pictures should go on beyond the frames so far, of a camera that pans; `None` if they go on as far. A
+    /// camera that has turned by more than 55 degrees from the middle of the pan shows parts that are not counted.
+    pub fn wider(&self) -> Option<Reach> {
+        let camera = self.view.as_ref().filter(|_| self.pans).map(|view| &view.camera)?;
+        let given = self.options.reach;
+        let turns = || {
+            self.motions.iter().filter(|motion| motion.state != CameraState::Lost).map(CameraMotion::turned)
+        };
+        let turn_rad = if given.is_wide() { given.turn_rad } else { middle(turns()) };
+        let from_pictures = matrix(turn_rad).transpose();
+        let mut px = given.px;
+        for needed in turns().map(|turned| canvas::reach_px(camera, &(turned * from_pictures))) {
+            px = std::array::from_fn(|side| px[side].max(needed[side]).min(MOST_REACH_PX));
+        }
+        (px != given.px).then_some(Reach { turn_rad, px })
     }
 
     /// The camera in the frames so far, of the last 25 000 of them.
@@ -467,7 +504,7 @@ impl Steadier {
     }
 
     fn view_of(&self, camera: Camera, picture: Image<u8>) -> View {
-        let canvas = Canvas::new(&camera, self.options.reach_about(self.given.is_some()), &picture);
+        let canvas = Canvas::new(&camera, self.options.reach.about(self.given.is_some()), &picture);
         View { camera, picture, canvas }
     }
 
@@ -687,16 +724,14 @@ impl Steadier {
         match &mut self.view {
             _ if self.is_lost => Steadied::Lost,
             // Pictures of one stream are of one size.
-            None if self.options.reach_px != [0; 4] => Steadied::Lost,
+            None if self.options.reach.is_wide() => Steadied::Lost,
             Some(view) if turned != DMat3::IDENTITY || view.canvas.is_wide() => {
                 // Through a lens, the first frame too may go on beyond its size.
                 let [own, needed] =
-                    [DMat3::IDENTITY, turned].map(|turned| view.canvas.reach_px(&view.camera, &turned));
-                for (k, side) in [0, 1, 0, 1].map(|k| f64::from(view.camera.size[k])).into_iter().enumerate()
-                {
-                    self.pans |= f64::from(needed[k]) - f64::from(own[k]) > PAN_SHARE * side;
-                    self.reach_px[k] = self.reach_px[k].max(own[k]).max(needed[k]);
-                }
+                    [DMat3::IDENTITY, turned].map(|turned| canvas::reach_px(&view.camera, &turned));
+                let sides = [0, 1, 0, 1].map(|k| f64::from(view.camera.size[k]));
+                let is_beyond = |k: usize| f64::from(needed[k]) - f64::from(own[k]) > PAN_SHARE * sides[k];
+                self.pans |= (0..4).any(is_beyond);
                 let (picture, unseen) = view.canvas.steadied(frame, &view.camera, &turned);
                 Steadied::Moved { picture, unseen }
             }
@@ -782,6 +817,18 @@ fn shared_with(camera: &Camera, turned: &Turned) -> f64 {
     let last = DVec2::new(f64::from(camera.size[0] - 1), f64::from(camera.size[1] - 1));
     let is_inside = |seen: DVec2| seen.cmpge(DVec2::ZERO).all() && seen.cmple(last).all();
     moved(camera, turned).filter(|(_, seen)| seen.is_some_and(is_inside)).count() as f64 / 49.0
+}
+
+/// The rotation to the camera that looks at the middle between the directions to which cameras are turned, upright as the first one.
+fn middle(turns: impl Iterator<Item = Turned>) -> DVec3 {
+    let (mut low, mut high) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
+    for turned in turns {
+        let ahead = turned.transpose() * DVec3::Z;
+        let aside_and_down = DVec2::new(ahead.x.atan2(ahead.z), ahead.y.clamp(-1.0, 1.0).asin());
+        (low, high) = (low.min(aside_and_down), high.max(aside_and_down));
+    }
+    let middle = if low.is_finite() { 0.5 * (low + high) } else { DVec2::ZERO };
+    vector(&(DMat3::from_rotation_x(middle.y) * DMat3::from_rotation_y(-middle.x)))
 }
 
 /// Rotation vector of a rotation.

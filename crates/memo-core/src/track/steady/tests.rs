@@ -416,29 +416,29 @@ fn larger_pictures_show_what_the_camera_turned_to() {
             (0..7).map(f64::from).map(|k| [0.03 * (0.9 * k).sin(), 0.04 * k, 0.003 * k]).collect();
         let mut small = steadier(Some(&camera));
         turns.iter().for_each(|turn| drop(pushed(&mut small, &shot(*turn).plain())));
-        // 1. The reach is where the borders of all frames are.
-        let reach_px = small.reach_px();
+        // 1. The pictures look at the middle of the pan, and their reach is where the borders of all frames are.
+        let reach = small.wider().unwrap();
+        assert!((reach.turn_rad.y - 0.12).abs() < 0.01 && reach.turn_rad.x.abs() < 0.01, "{reach:?}");
+        let from_first = matrix(reach.turn_rad);
+        let on_pictures = |ray: DVec3| ray.truncate() / ray.z * camera.focal_px + camera.centre_px;
+        let border = (0..=319).map(f64::from).flat_map(|k| {
+            let y = k.min(239.0);
+            [[0.0, y], [319.0, y], [k, 0.0], [k, 239.0]].map(DVec2::from_array)
+        });
+        let border: Vec<DVec2> = border.collect();
         let mut most = [0.0f64; 4];
-        for (turn, k) in turns.iter().flat_map(|turn| (0..=240).map(move |k| (turn, f64::from(k)))) {
-            for pixel in [
-                DVec2::new(0.0, k.min(239.0)),
-                DVec2::new(319.0, k.min(239.0)),
-                DVec2::new(k, 0.0),
-                DVec2::new(k, 239.0),
-            ] {
-                let ray =
-                    ((camera.undistort(pixel).unwrap() - camera.centre_px) / camera.focal_px).extend(1.0);
-                let first = matrix((*turn).into()).transpose() * ray;
-                let at = first.truncate() / first.z * camera.focal_px + camera.centre_px;
-                let beyond = [-at.x, -at.y, at.x - 319.0, at.y - 239.0];
-                most = std::array::from_fn(|side| most[side].max(beyond[side]));
-            }
+        for (turn, pixel) in turns.iter().flat_map(|turn| border.iter().map(move |pixel| (turn, *pixel))) {
+            let ray = ((camera.undistort(pixel).unwrap() - camera.centre_px) / camera.focal_px).extend(1.0);
+            let at = on_pictures(from_first * (matrix((*turn).into()).transpose() * ray));
+            let beyond = [-at.x, -at.y, at.x - 319.0, at.y - 239.0];
+            most = std::array::from_fn(|side| most[side].max(beyond[side]));
         }
+        let reach_px = reach.px;
         for (reach_px, most) in reach_px.into_iter().zip(most) {
             assert!((f64::from(reach_px) - most).abs() < 3.0, "{reach_px:?} {most:?}");
         }
         // 2. Each picture is the wall of the scene, as far as the frame shows it.
-        let options = SteadyOptions { reach_px, ..SteadyOptions::default() };
+        let options = SteadyOptions { reach, ..SteadyOptions::default() };
         let mut wide = Steadier::new(options, Some(&camera), None);
         let corner_px = DVec2::new(f64::from(reach_px[0]), f64::from(reach_px[1]));
         for (frame, turn) in turns.into_iter().enumerate() {
@@ -450,7 +450,9 @@ fn larger_pictures_show_what_the_camera_turned_to() {
             let (mut square, mut count) = (0.0, 0.0);
             for y in 0..picture.height() {
                 for x in (0..picture.width()).filter(|x| !unseen.at(*x, y)) {
-                    let wall = DVec2::new(x as f64, y as f64) - corner_px;
+                    let plane =
+                        (DVec2::new(x as f64, y as f64) - corner_px - camera.centre_px) / camera.focal_px;
+                    let wall = on_pictures(from_first.transpose() * plane.extend(1.0));
                     let off = f64::from(picture.at(x, y)) - texture(1, wall, 7.0).clamp(0.0, 255.0);
                     (square, count) = (square + off * off, count + 1.0);
                 }
@@ -462,6 +464,7 @@ fn larger_pictures_show_what_the_camera_turned_to() {
             let there = wide.in_steadied(frame, pixel);
             assert!(wide.in_frame(frame, there).distance(pixel) < 1e-6, "frame {frame}");
         }
+        assert_eq!(wide.wider(), None);
     }
 }
 
@@ -542,7 +545,15 @@ fn options_outside_their_ranges_are_refused() {
         (SteadyOptions { still_px: f64::NAN, ..options }, "still_px"),
         (SteadyOptions { least_support: 1.0, ..options }, "least_support"),
         (SteadyOptions { most_zoom_px: 0.0, ..options }, "most_zoom_px"),
-        (SteadyOptions { reach_px: [0, 5001, 0, 0], ..options }, "reach_px"),
+        (SteadyOptions { reach: Reach { px: [0, 5001, 0, 0], ..options.reach }, ..options }, "reach_px"),
+        (
+            SteadyOptions { reach: Reach { turn_rad: DVec3::Y * 2.1, ..options.reach }, ..options },
+            "reach_from_rad",
+        ),
+        (
+            SteadyOptions { reach: Reach { turn_rad: DVec3::NAN, ..options.reach }, ..options },
+            "reach_from_rad",
+        ),
     ] {
         assert_eq!(wrong.check().unwrap_err().name, name);
     }
