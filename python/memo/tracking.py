@@ -268,8 +268,9 @@ def fit_walk(
     `frames` are pictures of all frames from the first one that was tracked, (H, W) uint8 each, as large as
     the frames: the frames themselves, frames that were cleaned, or silhouettes from a segmentation, 255 on
     the person and 0 elsewhere. `empty` is the picture without people, 0 everywhere for silhouettes; None
-    takes the median of the frames where the person is elsewhere. Other people are taken for part of the
-    scene. The walk must be one that was tracked in this process, not one from a file or from a pickle.
+    takes the median of the frames where the person is elsewhere; of a camera that moves it is as the first
+    frame's camera shows it, and of one that pans it must be None or black. Other people are taken for part
+    of the scene. The walk must be one that was tracked in this process, not one from a file or from a pickle.
 
     `height_sd`: standard deviation of a given body height, as a share of it. `frame_sd_deg`: standard
     deviation of hip and knee about the person's own curves; ankle and arms have twice as much. If the model
