@@ -16,6 +16,7 @@ __all__ = [
     "Departure",
     "Explainer",
     "Explanation",
+    "FieldSeeker",
     "FrameMotion",
     "FrameSurvivors",
     "GaitCycle",

@@ -221,7 +221,8 @@ def track(
     `progress` is called with the number of frames done and the total, None if `frames` has no length;
     the options from `fov_deg` on are those of `Tracker`. Pixels in the result are those of the given frames.
     Frames of a camera that pans are tracked again in larger pictures (`reach_px`), and without `camera` and
-    `fov_deg` with the field of view that the pan shows (`field_of_view`), unless they can be read only once.
+    `fov_deg` with the field of view that the pan shows (`field_of_view`), unless they can be read only once;
+    `progress` then begins again.
     An interrupt (Ctrl-C) passes through; use `Tracker` to keep what was tracked until then.
     """
     if (times_s is None) == (fps is None):

@@ -2,12 +2,13 @@
 //!
 //! 1. The rotation of the camera is estimated from the strongest gradients of a key frame, spread over the picture
 //!    (`template`), from coarse to fine (`pyramid`), with weights that leave out people (`estimate`; Baker and Matthews
-//!    2004, *Lucas-Kanade 20 Years On*, inverse compositional). It starts at the rotation of the frame before.
+//!    2004, *Lucas-Kanade 20 Years On*, inverse compositional). It starts at the rotation of the frame before, and where a camera
+//!    that moves would be if it went on as it did.
 //! 2. If the picture has moved by [`SteadyOptions::still_px`] or more, it is interpolated in the camera of the first
 //!    frame (`warp`). Otherwise it is left as it is, bit for bit: a tripod costs the estimate only. For a camera that pans, the
 //!    steadied pictures may be larger than the frames (`canvas`).
 //! 3. A frame that overlaps the key frame little, or agrees with it less and less, becomes the next key frame; its rotation
-//!    is chained with that of the key frame before.
+//!    is chained with that of the key frame before. So does the frame before one that no key frame explains.
 //! 4. If a frame and those after it agree with each other but not with the key frames, the shot has changed. If the focal
 //!    length changes, the picture is zoomed. Both end the view ([`Loss`]).
 //! 5. A frame that no rotation explains, but whose parts look as in the first frame, only brighter or darker, is lit unevenly.
