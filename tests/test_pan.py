@@ -54,7 +54,7 @@ def test_frames_that_are_read_once_are_tracked_in_the_first_view(panned, track):
     assert max(wider["reach_px"]) > 100 and len(once) < 0.8 * len(track)
     (said,) = (sentence for sentence in once.sentences if sentence.startswith("The camera pans"))
     assert all(f"{name}={value}" in said for name, value in wider.items())
-    # Whoever asks for no more gets no more; with what is said to be needed it is the whole walk.
+    # With a reach of 0 nothing is tracked again; with the reach in the sentence, the whole walk is.
     assert len(memo.track(panned.frames, **given, reach_px=(0, 0, 0, 0))) == len(once)
     wide = memo.track(iter(panned.frames), **given, **wider)
     np.testing.assert_array_equal(wide.columns["x_m"], track.columns["x_m"])

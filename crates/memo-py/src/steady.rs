@@ -69,7 +69,7 @@ pub fn wider_of(reach: Reach) -> Wider {
 
 /// How far pictures go on beyond frames, of these arguments.
 pub fn reach(reach_px: Option<Whole<[u32; 4]>>, reach_from_rad: Option<[f64; 3]>) -> PyResult<Reach> {
-    let px = reach_px.must_be("reach_px", "four whole numbers from 0 to 5000")?.unwrap_or_default();
+    let px = reach_px.must_be("reach_px", "four whole numbers from 0 to 2000")?.unwrap_or_default();
     Ok(Reach { turn_rad: reach_from_rad.unwrap_or_default().into(), px })
 }
 

@@ -1,16 +1,12 @@
 //! The steadied pictures: those of the first view's camera, or larger ones for a camera that pans, whose camera looks at the middle
 //! of the pan.
 
-use super::template::pixel_of;
+use super::template::{pixel_of, ray_of};
 use super::warp::Warp;
-use super::{Reach, Turned, matrix, places};
+use super::{Reach, Turned, matrix};
 use crate::image::{Frame, Image, Mask};
 use crate::model::Camera;
 use glam::{DVec2, DVec3};
-
-/// Rays farther from the axis of the pictures are not shown, as the tangent of 55 degrees: there pixels are three times as
-/// wide as on the axis.
-const FARTHEST_TAN: f64 = 1.428;
 
 /// What is drawn of the frames.
 #[derive(Debug)]
@@ -63,36 +59,13 @@ impl Canvas {
 
     /// Where a pixel of a turned camera is; `None` of one that is behind the first view's camera.
     pub fn pixel(&self, camera: &Camera, turned: &Turned, pixel: DVec2) -> Option<DVec2> {
-        pixel_of(&self.camera, &(*turned * self.first_turned).transpose(), ray(camera, pixel)?)
+        pixel_of(&self.camera, &(*turned * self.first_turned).transpose(), ray_of(camera, pixel)?)
     }
 
     /// Where one of its pixels is in a frame of a turned camera; `None` of one that is behind it.
     pub fn frame_pixel(&self, camera: &Camera, turned: &Turned, pixel: DVec2) -> Option<DVec2> {
-        pixel_of(camera, &(*turned * self.first_turned), ray(&self.camera, pixel)?)
+        pixel_of(camera, &(*turned * self.first_turned), ray_of(&self.camera, pixel)?)
     }
-}
-
-/// How far a camera that is turned from that of the pictures shows what is beyond a frame of that camera: left, top, right and
-/// bottom, pixels.
-pub(super) fn reach_px(camera: &Camera, turned: &Turned) -> [u32; 4] {
-    let last = DVec2::new(f64::from(camera.size[0] - 1), f64::from(camera.size[1] - 1));
-    let mut most = [0.0f64; 4];
-    for pixel in places(camera) {
-        let Some(ray) = ray(camera, pixel).map(|ray| turned.transpose() * ray) else { continue };
-        let plane = ray.truncate() / ray.z;
-        if ray.z <= 0.0 || plane.length() > FARTHEST_TAN {
-            continue;
-        }
-        let at = camera.centre_px + camera.focal_px * plane;
-        let beyond = [-at.x, -at.y, at.x - last.x, at.y - last.y];
-        most = std::array::from_fn(|side| most[side].max(beyond[side]));
-    }
-    most.map(|beyond| beyond.ceil() as u32)
-}
-
-/// The direction of a pixel, in the axes of its camera.
-fn ray(camera: &Camera, pixel: DVec2) -> Option<DVec3> {
-    Some(((camera.undistort(pixel).ok()? - camera.centre_px) / camera.focal_px).extend(1.0))
 }
 
 /// A picture of a camera that has turned from the first view's, in the pictures of another camera in its place; what it does not show

@@ -26,6 +26,7 @@ mod canvas;
 mod estimate;
 mod field;
 mod pyramid;
+mod reach;
 mod template;
 mod warp;
 
@@ -34,15 +35,16 @@ use crate::image::{Frame, FrameError, Image, Mask};
 use crate::model::{Camera, assumed_field_of_view_rad};
 use crate::wording::counted;
 pub(crate) use canvas::turned_back;
-
 pub use field::{FieldOfView, FieldSeeker};
+pub use reach::Reach;
 
 use canvas::Canvas;
 use estimate::{Comparison, Estimate};
 use glam::{DMat3, DQuat, DVec2, DVec3};
 use pyramid::Pyramid;
+use reach::FARTHEST_TAN;
 use std::collections::VecDeque;
-use template::{Template, pixel_of};
+use template::{Template, pixel_of, ray_of};
 use thiserror::Error;
 
 /// Rotation from the first view's camera to that of a frame.
@@ -86,16 +88,6 @@ pub struct SteadyOptions {
     pub reach: Reach,
 }
 
-/// How far steadied pictures go on beyond a frame. [`Steadier::wider`] says how far they should.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Reach {
-    /// Rotation vector from the first frame's camera to that of the pictures, radians, camera axes: to the middle of a pan.
-    pub turn_rad: DVec3,
-    /// How far the pictures go on beyond a frame of that camera, pixels: left, top, right and bottom. Without a given camera it is the
-    /// larger one of both sides.
-    pub px: [u32; 4],
-}
-
 impl Default for SteadyOptions {
     fn default() -> Self {
         Self { still_px: 0.3, least_support: 0.35, most_zoom_px: 3.0, reach: Reach::default() }
@@ -109,35 +101,7 @@ impl SteadyOptions {
         let is_share = self.least_support > 0.0 && self.least_support < 1.0;
         OptionError::unless(is_share, "least_support", "between 0 and 1", self.least_support)?;
         OptionError::unless_positive("most_zoom_px", self.most_zoom_px)?;
-        let farthest = self.reach.px.into_iter().max().unwrap_or(0);
-        let turn_rad = self.reach.turn_rad.length();
-        OptionError::unless(
-            turn_rad <= MOST_TURN_RAD,
-            "reach_from_rad",
-            "of a turn of at most 2 rad",
-            turn_rad,
-        )?;
-        let is_possible = farthest <= MOST_REACH_PX;
-        OptionError::unless(is_possible, "reach_px", "at most 5000 pixels", f64::from(farthest))
-    }
-}
-
-impl Reach {
-    /// True if the pictures are larger than the frames.
-    pub(crate) fn is_wide(&self) -> bool {
-        *self != Self::default()
-    }
-
-    /// The reach about an image of a camera that is given or assumed.
-    pub(crate) fn about(self, is_given: bool) -> Self {
-        let [left, top, right, bottom] = self.px;
-        let (aside, up) = (left.max(right), top.max(bottom));
-        if is_given { self } else { Self { px: [aside, up, aside, up], ..self } }
-    }
-
-    /// The camera of the pictures.
-    pub(crate) fn camera(&self, first: &Camera) -> Camera {
-        if self.is_wide() { first.turned(self.turn_rad).widened(self.px) } else { first.clone() }
+        self.reach.check()
     }
 }
 
@@ -284,11 +248,6 @@ const MOST_MOTIONS: usize = 25_000;
 const MOST_LOSSES: usize = 100;
 /// A camera that moves by more than this from frame to frame is looked for where it would be if it went on, too, pixels.
 const PACE_PX: f64 = 0.5;
-/// A camera pans if it shows more than this share of a frame's side beyond the first frame. One that shakes shows less.
-const PAN_SHARE: f64 = 0.05;
-/// The largest [`Reach`].
-const MOST_TURN_RAD: f64 = 2.0;
-const MOST_REACH_PX: u32 = 5_000;
 /// The coarsest level has about this many pixels along its shorter side.
 const COARSEST_PX: usize = 100;
 
@@ -351,6 +310,8 @@ pub struct Steadier {
     news: Option<Loss>,
     /// Whether frames go on beyond the first one by more than shaking.
     pans: bool,
+    /// Whether frames are compared with key frames only.
+    keys_only: bool,
 }
 
 impl Steadier {
@@ -379,7 +340,13 @@ impl Steadier {
             losses: Vec::new(),
             news: None,
             pans: false,
+            keys_only: false,
         }
+    }
+
+    /// The same, which does not go on from frame to frame where no key frame shows the camera: a wrong one would.
+    fn by_keys_only(self) -> Self {
+        Self { keys_only: true, ..self }
     }
 
     /// Steadies the next frame.
@@ -453,23 +420,6 @@ impl Steadier {
         let motion = self.motions.get(frame.checked_sub(self.motions.front()?.frame)?)?;
         let is_as_given = motion.turn_rad == DVec3::ZERO && !view.canvas.is_wide();
         if is_as_given { None } else { at(view, &motion.turned()) }
-    }
-
-    /// How far the steadied pictures should go on beyond the frames so far, of a camera that pans; `None` if they go on as far. A
-    /// camera that has turned by more than 55 degrees from the middle of the pan shows parts that are not counted.
-    pub fn wider(&self) -> Option<Reach> {
-        let camera = self.view.as_ref().filter(|_| self.pans).map(|view| &view.camera)?;
-        let given = self.options.reach;
-        let turns = || {
-            self.motions.iter().filter(|motion| motion.state != CameraState::Lost).map(CameraMotion::turned)
-        };
-        let turn_rad = if given.is_wide() { given.turn_rad } else { middle(turns()) };
-        let from_pictures = matrix(turn_rad).transpose();
-        let mut px = given.px;
-        for needed in turns().map(|turned| canvas::reach_px(camera, &(turned * from_pictures))) {
-            px = std::array::from_fn(|side| px[side].max(needed[side]).min(MOST_REACH_PX));
-        }
-        (px != given.px).then_some(Reach { turn_rad, px })
     }
 
     /// The camera in the frames so far, of the last 25 000 of them.
@@ -566,7 +516,7 @@ impl Steadier {
 
     /// The estimate against the last frame of a camera that moves, which becomes a key frame, when no key frame explains this one.
     fn compared_with_last(&mut self, pyramid: &Pyramid<'_>) -> Option<(usize, Estimate)> {
-        if self.unexplained > 0 || self.is_lost {
+        if self.unexplained > 0 || self.is_lost || self.keys_only {
             return None;
         }
         let (camera, last) = (&self.view.as_ref()?.camera, self.last_frame.as_ref()?.as_frame());
@@ -727,12 +677,7 @@ impl Steadier {
             // Pictures of one stream are of one size.
             None if self.options.reach.is_wide() => Steadied::Lost,
             Some(view) if turned != DMat3::IDENTITY || view.canvas.is_wide() => {
-                // Through a lens, the first frame too may go on beyond its size.
-                let [own, needed] =
-                    [DMat3::IDENTITY, turned].map(|turned| canvas::reach_px(&view.camera, &turned));
-                let sides = [0, 1, 0, 1].map(|k| f64::from(view.camera.size[k]));
-                let is_beyond = |k: usize| f64::from(needed[k]) - f64::from(own[k]) > PAN_SHARE * sides[k];
-                self.pans |= (0..4).any(is_beyond);
+                self.pans |= reach::is_panned(&view.camera, &turned);
                 let (picture, unseen) = view.canvas.steadied(frame, &view.camera, &turned);
                 Steadied::Moved { picture, unseen }
             }
@@ -794,18 +739,17 @@ fn places(camera: &Camera) -> impl Iterator<Item = DVec2> {
 
 /// Places of a picture and where the turned camera shows them, pixels; `None` where it does not.
 fn moved(camera: &Camera, turned: &Turned) -> impl Iterator<Item = (DVec2, Option<DVec2>)> {
-    places(camera).map(|place| {
-        let ray = |ideal: DVec2| ((ideal - camera.centre_px) / camera.focal_px).extend(1.0);
-        let seen = camera.undistort(place).ok().and_then(|ideal| pixel_of(camera, turned, ray(ideal)));
-        (place, seen)
-    })
+    places(camera).map(|place| (place, ray_of(camera, place).and_then(|ray| pixel_of(camera, turned, ray))))
 }
 
 /// Largest and root mean square displacement over the picture, pixels; NaN if it shows nothing of the picture.
 fn displacement_px(camera: &Camera, turned: &Turned) -> [f64; 2] {
     let (mut largest, mut sum, mut count) = (0.0f64, 0.0, 0.0);
+    let axis_tan = |pixel: DVec2| ((pixel - camera.centre_px) / camera.focal_px).length();
     for (place, seen) in moved(camera, turned) {
-        let off = seen.map(|seen| seen.distance(place));
+        // What turns out of sight goes on to infinity.
+        let in_sight = seen.filter(|seen| axis_tan(*seen) <= FARTHEST_TAN.max(axis_tan(place)));
+        let off = in_sight.map(|seen| seen.distance(place));
         largest = largest.max(off.unwrap_or(0.0));
         sum += off.map_or(0.0, |off| off * off);
         count += f64::from(u8::from(off.is_some()));
@@ -818,18 +762,6 @@ fn shared_with(camera: &Camera, turned: &Turned) -> f64 {
     let last = DVec2::new(f64::from(camera.size[0] - 1), f64::from(camera.size[1] - 1));
     let is_inside = |seen: DVec2| seen.cmpge(DVec2::ZERO).all() && seen.cmple(last).all();
     moved(camera, turned).filter(|(_, seen)| seen.is_some_and(is_inside)).count() as f64 / 49.0
-}
-
-/// The rotation to the camera that looks at the middle between the directions to which cameras are turned, upright as the first one.
-fn middle(turns: impl Iterator<Item = Turned>) -> DVec3 {
-    let (mut low, mut high) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
-    for turned in turns {
-        let ahead = turned.transpose() * DVec3::Z;
-        let aside_and_down = DVec2::new(ahead.x.atan2(ahead.z), ahead.y.clamp(-1.0, 1.0).asin());
-        (low, high) = (low.min(aside_and_down), high.max(aside_and_down));
-    }
-    let middle = if low.is_finite() { 0.5 * (low + high) } else { DVec2::ZERO };
-    vector(&(DMat3::from_rotation_x(middle.y) * DMat3::from_rotation_y(-middle.x)))
 }
 
 /// Rotation vector of a rotation.

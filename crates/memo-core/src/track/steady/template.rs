@@ -169,6 +169,11 @@ pub fn flow_per_turn(plane: DVec2) -> [DVec3; 2] {
     [DVec3::new(-x * y, 1.0 + x * x, -y), DVec3::new(-1.0 - y * y, x * y, x)]
 }
 
+/// The ray of a pixel of the finest level, (x, y, 1) in the camera's axes; `None` where the lens has no ideal pixel.
+pub fn ray_of(camera: &Camera, pixel: DVec2) -> Option<DVec3> {
+    Some(((camera.undistort(pixel).ok()? - camera.centre_px) / camera.focal_px).extend(1.0))
+}
+
 /// The pixel of the finest level at which a turned camera sees a ray; `None` behind the camera or beyond its lens.
 pub fn pixel_of(camera: &Camera, turned: &Turned, ray: DVec3) -> Option<DVec2> {
     let seen = *turned * ray;

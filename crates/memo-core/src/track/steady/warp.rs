@@ -6,7 +6,7 @@
 //! a = -1/2): a linear one would blur the wall, differently in each frame.
 
 use super::Turned;
-use super::template::pixel_of;
+use super::template::{pixel_of, ray_of};
 use crate::image::{Frame, Image, Mask};
 use crate::model::Camera;
 use glam::{DVec2, DVec3};
@@ -32,8 +32,7 @@ impl Warp {
         let [across, down] = camera.size.map(|side| (side as usize).div_ceil(CELL_PX) + 1);
         let ray = |k: usize| {
             let pixel = DVec2::new((k % across * CELL_PX) as f64, (k / across * CELL_PX) as f64);
-            let ideal = camera.undistort(pixel).ok()?;
-            Some(((ideal - camera.centre_px) / camera.focal_px).extend(1.0))
+            ray_of(camera, pixel)
         };
         Self { rays: (0..across * down).map(ray).collect(), across, kernel: kernel() }
     }
