@@ -417,7 +417,7 @@ fn worst_of_pan(pans: impl Iterator<Item = f64>, wall: impl Fn(usize, DVec2) -> 
 #[test]
 fn a_fast_pan_goes_on_as_it_did() {
     let pans = (0..24).scan(0.0, |pan, k| {
-        *pan += 0.0015 * f64::from((k as i32).min(16));
+        *pan += 0.0015 * f64::from(k.min(16));
         Some(*pan)
     });
     let worst = worst_of_pan(pans, |_, wall| texture(1, wall, 3.0));
@@ -493,7 +493,7 @@ fn larger_pictures_show_what_the_camera_turned_to() {
 #[test]
 fn a_pan_goes_on_from_frame_to_frame() {
     let pans = (0..18).scan(0.0, |pan, k| {
-        *pan += 0.002 * f64::from((k as i32).min(4));
+        *pan += 0.002 * f64::from(k.min(4));
         Some(*pan)
     });
     let worst = worst_of_pan(pans, |k, wall| {
